@@ -17,27 +17,32 @@ import subprocess
 import tempfile
 
 
+def spent_s():
+    """Processor time of the programs that have ended (s)."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
 def lines(program, track, *flags):
     """The summary of a study, and the processor time that it took (s)."""
     with tempfile.TemporaryDirectory() as folder:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        before_s = spent_s()
         command = [program, "raceline", "--track", track, "--out", f"{folder}/run", "--quiet", *flags]
         subprocess.run(command, check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu_s = spent_s() - before_s
         summary = json.loads(pathlib.Path(folder, "run", "summary.json").read_text())
-    return summary, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return summary, cpu_s
 
 
 def driven(program, track):
     """The row of a circuit that the 4DOF car drives: laps, what it loses, room to the edge, grip of its corners, processor time."""
     with tempfile.TemporaryDirectory() as folder:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        before_s = spent_s()
         line = ["raceline", "--track", track, "--objectives", "lap_time", "--car-width-m", "3", "--out", f"{folder}/line"]
         subprocess.run([program, *line, "--quiet"], check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
         drive = ["transient", "--line", f"{folder}/line/line_fastest.csv", "--out", f"{folder}/drive", "--quiet"]
         ended = subprocess.run([program, *drive], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        cpu_s = spent_s() - before_s
         file = pathlib.Path(folder, "drive", "summary.json")
         if not file.exists():
             return f"{' '.join(ended.stderr.split())} | | | | | | {cpu_s:.1f}"

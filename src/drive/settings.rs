@@ -4,6 +4,7 @@ use super::driver::PEDAL_LAG_S;
 use super::plan::load_mps2;
 use crate::error::{Error, Result};
 use crate::vehicle::{Car, Turn, steady_car};
+use nalgebra::{Matrix2, Vector2};
 
 /// How the driver drives.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,10 +35,10 @@ pub struct DriverSettings {
 /// steer against the car's normal drift angle. Without the friction the driver would use grip for driving that the bend needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarKnowledge {
-    /// Steering beyond what the bend itself asks for, for every m/s^2 of lateral acceleration (rad s^2/m): that at little of it, and
-    /// what comes to it at the limit, with the fourth power of the share of the grip that is used.
+    /// Steering beyond the wheelbase times the curvature (rad), over the lateral acceleration (m/s^2): `p` and `q` of `p + q u^4`
+    /// (rad s^2/m), where `u` is the share of the grip that is used.
     pub understeer: [f64; 2],
-    /// Slip angle of the rear axle, likewise: it turns the car into the bend.
+    /// Slip angle of the rear axle, which turns the car into the bend, likewise.
     pub rear_slip: [f64; 2],
     /// Lateral acceleration that the tyres give for every m/s^2 of load over mass: a coefficient of friction.
     pub friction: f64,
@@ -49,7 +50,7 @@ const SPEEDS_MPS: [f64; 5] = [15.0, 25.0, 40.0, 55.0, 70.0];
 const MOST_SHARE: f64 = 0.96;
 
 impl CarKnowledge {
-    /// From the car's steady states in bends.
+    /// From the car's steady states in bends, up to 0.96 of the greatest lateral acceleration.
     ///
     /// # Errors
     /// [`Error::Study`] if the car has none.
@@ -80,33 +81,25 @@ impl CarKnowledge {
                 [t.ay_mps2, load, understeer, rear_slip]
             }));
         }
-        let fitted = |angle: usize| {
-            // The least squares of two terms, over the angles themselves.
-            let (mut squares, mut products) = ([0.0; 3], [0.0; 2]);
+        // Least squares over the angles themselves.
+        let fitted = |angle: usize| -> Option<[f64; 2]> {
+            let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
             for state in &states {
                 let share = (state[0] / (friction * state[1])).min(1.0);
-                let terms = [state[0], state[0] * share.powi(4)];
-                for (sum, [i, j]) in squares.iter_mut().zip([[0, 0], [0, 1], [1, 1]]) {
-                    *sum += terms[i] * terms[j];
-                }
-                for (sum, term) in products.iter_mut().zip(terms) {
-                    *sum += term * state[angle];
-                }
+                let terms = Vector2::new(state[0], state[0] * share.powi(4));
+                normal += terms * terms.transpose();
+                right += terms * state[angle];
             }
-            let determinant = squares[0] * squares[2] - squares[1] * squares[1];
-            let by = |a: f64, b: f64| (a * products[0] + b * products[1]) / determinant;
-            [by(squares[2], -squares[1]), by(-squares[1], squares[0])]
+            normal.lu().solve(&right).map(Into::into)
         };
-        let knowledge = Self {
-            understeer: fitted(2),
-            rear_slip: fitted(3),
-            friction,
-        };
-        let known = [knowledge.understeer, knowledge.rear_slip];
-        if known.as_flattened().iter().all(|figure| figure.is_finite()) && friction.is_finite() {
-            return Ok(knowledge);
+        match (fitted(2), fitted(3)) {
+            (Some(understeer), Some(rear_slip)) => Ok(Self {
+                understeer,
+                rear_slip,
+                friction,
+            }),
+            _ => Err(Error::Study(format!("{} has no steady state in bends", car.name))),
         }
-        Err(Error::Study(format!("{} has no steady state in bends", car.name)))
     }
 }
 
@@ -119,8 +112,8 @@ impl DriverSettings {
         Ok(Self {
             heading_gain: 1.0,
             speed_gain_1ps: 6.0,
-            // The acceleration leads by what the feet lag behind: of a step in it no error of speed is left. Who aims for the speed
-            // ahead as well brakes early in every corner, for a hundredth of the lap.
+            // The acceleration leads by as much as the feet lag, so that a step of it leaves no error of speed. A driver who aims for
+            // the speed ahead as well brakes early in every corner, and loses a hundredth of the lap.
             speed_ahead_s: 0.0,
             plan_ahead_s: PEDAL_LAG_S,
             knowledge: Some(CarKnowledge::of_car(car)?),

@@ -5,7 +5,7 @@ use super::kernel::{self, Course, Wanted, lap_time, shape};
 use super::*;
 use crate::track::{CrossSections, SectionRelief};
 use crate::vehicle::powertrain::GRAVITY_MPS2;
-use crate::vehicle::{Envelope, EnvelopeRow};
+use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
 use glam::DVec2;
 use std::f64::consts::{PI, TAU};
 
@@ -254,6 +254,39 @@ fn the_fine_line_has_the_lap_of_the_cross_sections() {
         .map(|(a, z)| (a[0] - z).abs())
         .fold(0.0, f64::max);
     assert!(off < 0.02, "{off}");
+}
+
+/// Losses in bends that fall from 2 to 0.5 m/s^2 over the loads that were swept. Beyond these they fall to nothing, and give nothing
+/// back.
+#[test]
+fn tyres_give_nothing_back_beyond_the_loads_that_were_swept() {
+    let under = |lost: f64| {
+        let limits = car([15.0, 14.0, 5.0, 1.0], 70.0).envelope;
+        let rows = limits.rows().len();
+        let in_bends = BendTraction {
+            shares: vec![0.0, 1.0],
+            rows: vec![vec![14.0, 0.0]; rows],
+            lost: vec![vec![lost; 2]; rows],
+        };
+        limits.with_bend_traction(in_bends).unwrap()
+    };
+    let envelope = under(1.25).with_loads(vec![(0.6, under(2.0)), (1.0, under(1.25)), (1.4, under(0.5))]);
+    let car = PointMass {
+        relief: true,
+        ..PointMass::new(envelope.unwrap(), 2.6)
+    };
+    let table = car.table().unwrap();
+    for (share, wanted) in [(0.6, 2.0), (1.2, 0.875), (1.6, 0.125), (1.8, 0.0), (2.4, 0.0)] {
+        let there = Sloped {
+            bend: 0.0,
+            dip: 0.0,
+            climb: 0.0,
+            lean: 0.0,
+            press: share * GRAVITY_MPS2,
+        };
+        let [_, lost] = Ground::<f64>::left_for_driving(there, &table, 900.0, 1.0);
+        assert!((lost - wanted).abs() < 1e-9, "{share}: {lost}");
+    }
 }
 
 /// Swept limits are met at their own loads, and between them half-way.

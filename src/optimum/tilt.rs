@@ -204,9 +204,10 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::super::{Bounds, DescentSettings, LineMap, PointMassEnvelope, ReferenceProblem, fastest};
+    use super::*;
     use crate::line::{FineLine, PointMass};
     use crate::track::{CrossSections, SectionRelief, Shape, Spacing};
-    use crate::vehicle::{Envelope, EnvelopeRow};
+    use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
     use std::f64::consts::TAU;
 
     /// An ellipse with hills, 8 m high, and banking of up to eight degrees, as much of both as is asked for.
@@ -275,6 +276,43 @@ mod tests {
         assert!((hills[0] / level[0] - 1.0).abs() > 5e-3, "{hills:?} {level:?}");
         let off = (hills[0] / hills[1]) / (level[0] / level[1]) - 1.0;
         assert!(off.abs() < 2e-3, "{hills:?} {level:?}");
+    }
+
+    /// Tyres that lose less of the engine the more they carry leave no more than all of it, however much that is.
+    #[test]
+    fn the_engine_gives_no_more_than_it_has_beyond_the_loads_that_were_swept() {
+        let under = |lost: f64| {
+            let limits = car().envelope;
+            let rows = limits.rows().len();
+            let in_bends = BendTraction {
+                shares: vec![0.0, 1.0],
+                rows: vec![vec![100.0; 2]; rows],
+                lost: vec![vec![lost; 2]; rows],
+            };
+            limits.with_bend_traction(in_bends).unwrap()
+        };
+        let loads = vec![(0.6, under(2.0)), (1.0, under(1.25)), (1.4, under(0.5))];
+        let car = PointMass {
+            envelope: under(1.25).with_loads(loads).unwrap(),
+            ..car()
+        };
+        let envelope = PointMassEnvelope::new(&car).unwrap();
+        for share in [1.2, 1.8, 2.4] {
+            let tilt = Tilt {
+                dip: 0.0,
+                climb: 0.0,
+                lean: 0.0,
+                press: share * GRAVITY_MPS2,
+            };
+            let there = Tilted::of(&envelope, tilt);
+            let drive = there.at(40.0).drive.value;
+            let left = there.traction(40.0, 1.0).map(|bend| bend.value);
+            assert_eq!(left.is_some(), share < 1.6, "{share}: {left:?} of {drive}");
+            assert!(
+                left.is_none_or(|left| left < drive),
+                "{share}: {left:?} of {drive}"
+            );
+        }
     }
 
     /// A line that the solver finds on hills is faster there than the one it finds for the level road.

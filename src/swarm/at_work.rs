@@ -178,7 +178,7 @@ impl<'a> SwarmAtWork<'a> {
         if let Place::Device(resident) = &self.place {
             let (swarm, _) = resident.on_board.as_ref().ok_or_else(no_device)?;
             let swarm = Mopso::from_device(swarm.state()?);
-            self.state.swarm.back(swarm);
+            self.state.swarm.take_back(swarm);
         }
         self.state.losses.clone_from(&self.losses);
         Ok(())

@@ -173,9 +173,9 @@ impl FrontSwarm {
         }
     }
 
-    /// The same search as that swarm has come back from a device.
+    /// Takes the one swarm back from a device.
     #[cfg(feature = "gpu")]
-    pub fn back(&mut self, swarm: Mopso) {
+    pub fn take_back(&mut self, swarm: Mopso) {
         self.kind = Kind::Swarm(Box::new(swarm));
     }
 
@@ -184,7 +184,7 @@ impl FrontSwarm {
         self.trail.reached()
     }
 
-    /// Its way, for who takes its steps elsewhere.
+    /// Its way, to note steps that are taken on a device.
     #[cfg(feature = "gpu")]
     pub fn trail_mut(&mut self) -> &mut Trail {
         &mut self.trail

@@ -5,6 +5,7 @@ use super::crossing::bridges;
 use super::relief::{SectionRelief, cubic, level_road};
 use crate::{Error, Place, Result};
 use glam::DVec2;
+use std::ops::Range;
 
 /// Cross-sections across a circuit, each from its right edge to its left one.
 ///
@@ -205,9 +206,12 @@ impl CrossSections {
                 let expected = format!("1/{of} to {of}/{of}, with at most {} sectors", n / 2);
                 return Err(Error::input(&self.name, "section", name, expected));
             }
-            let (first, end) = ((number - 1) * n / of, number * n / of);
+            let sector = self.sector(number - 1, of);
             let spacing_m = self.length_m / n as f64;
-            return Ok((self.station_m[first], (end - first - 1) as f64 * spacing_m));
+            return Ok((
+                self.station_m[sector.start],
+                (sector.len() - 1) as f64 * spacing_m,
+            ));
         }
         let called = |all: &str| all == name || all.split('/').any(|one| one.trim() == name);
         let Some(section) = self.sections.iter().find(|s| called(&s.name)) else {
@@ -220,6 +224,11 @@ impl CrossSections {
             return Err(Error::input(&self.name, "section", name, expected));
         };
         Ok((section.start_m, section.length_m()))
+    }
+
+    /// The cross-sections of a sector, counted from 0, of so many with equally many of them.
+    pub fn sector(&self, number: usize, of: usize) -> Range<usize> {
+        number * self.len() / of..(number + 1) * self.len() / of
     }
 
     /// The first cross-section at or after a station (m).

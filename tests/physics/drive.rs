@@ -313,3 +313,59 @@ fn the_driver_knows_wind_and_drs() {
     });
     assert!((one - other).abs() < 0.03, "{one} {other}");
 }
+
+/// A bend of 260 m at 65 m/s takes five sixths of the grip. A driver who knows how both axles slip there stays on his line. One who is
+/// told no more than the slip at little of the grip runs wide.
+#[test]
+fn a_driver_who_knows_the_car_stays_on_his_line_in_long_fast_bends() {
+    let car = bundled_car();
+    let circuit = banked(260.0, 0.0);
+    let off_m = |settings: &DriverSettings| {
+        let plan = SpeedPlan::of_speeds(&[0.0], &[65.0], circuit.length_m);
+        let driven = drive_planned(&car, &circuit, plan, settings, 0.05).expect("it gets round");
+        driven.offset_m.last().expect("a sample").abs()
+    };
+    let knows = DriverSettings::racing(&car).expect("steady states");
+    let mut told_less = knows.clone();
+    let knowledge = told_less.knowledge.as_mut().expect("what he knows");
+    (knowledge.understeer[1], knowledge.rear_slip[1]) = (0.0, 0.0);
+    let (on_line, wide) = (off_m(&knows), off_m(&told_less));
+    assert!(on_line < 0.1 && wide > 2.0 * on_line, "{on_line} m and {wide} m");
+}
+
+/// Braking at 12 m/s^2 from 60 to 30 m/s on the arc of a large circle: half-way the driver is at the planned speed. One who aims for
+/// the speed ahead of him has slowed down too early.
+#[test]
+fn the_driver_brakes_on_his_mark() {
+    let car = bundled_car();
+    let circuit = banked(600.0, 0.0);
+    let braked = |station: f64| (3600.0 - 24.0 * (station - 1500.0).clamp(0.0, 112.5)).sqrt();
+    let stations: Vec<f64> = (0..circuit.length_m as usize).map(|i| i as f64).collect();
+    // Slowly back to where it began.
+    let back =
+        |station: f64| 30.0 + 30.0 * ((station - 1700.0) / (circuit.length_m - 1700.0)).clamp(0.0, 1.0);
+    let plan_at = |station: f64| {
+        if station < 1700.0 {
+            braked(station)
+        } else {
+            back(station)
+        }
+    };
+    let speeds: Vec<f64> = stations.iter().map(|s| plan_at(*s)).collect();
+    let off_mps = |settings: &DriverSettings| {
+        let plan = SpeedPlan::of_speeds(&stations, &speeds, circuit.length_m);
+        let driven = drive_planned(&car, &circuit, plan, settings, 0.01).expect("it gets round");
+        let middle = driven.station_m.partition_point(|s| *s < 1556.0);
+        driven.states[middle][0] - plan_at(driven.station_m[middle])
+    };
+    let on_mark = DriverSettings::racing(&car).expect("steady states");
+    let early = DriverSettings {
+        speed_ahead_s: on_mark.plan_ahead_s,
+        ..on_mark.clone()
+    };
+    let (on_mark, early) = (off_mps(&on_mark), off_mps(&early));
+    assert!(
+        on_mark.abs() < 0.3 && early < -0.6,
+        "{on_mark} m/s and {early} m/s"
+    );
+}

@@ -291,6 +291,19 @@ impl Steps {
     }
 }
 
+/// A search for lines that nothing breaks off, and the stage of each of its steps.
+fn lines_at_once(settings: &RacelineSettings, setup: &raceline::Setup) -> (raceline::Outcome, Vec<String>) {
+    let mut stages = Vec::new();
+    let mut steps = Steps::default();
+    let outcome = solve::<Raceline>(settings, setup, (None, &mut StateFile::idle()), |p| {
+        if steps.is_next(p) {
+            stages.push(p.stage.clone());
+        }
+        ControlFlow::Continue(())
+    });
+    (outcome.unwrap().unwrap(), stages)
+}
+
 /// Breaks a search for lines off at each of these observations in turn, goes on each time, and holds the end against `wanted`.
 fn lines_in_pieces(
     (settings, setup): (&RacelineSettings, &raceline::Setup),
@@ -332,16 +345,7 @@ fn lines_in_pieces(
 fn lines_are_resumed_bit_for_bit_from_every_stage() {
     let settings = lines();
     let setup = raceline::set_up(&settings).unwrap();
-    let mut stages: Vec<String> = Vec::new();
-    let mut steps = Steps::default();
-    let whole = solve::<Raceline>(&settings, &setup, (None, &mut StateFile::idle()), |p| {
-        if steps.is_next(p) {
-            stages.push(p.stage.clone());
-        }
-        ControlFlow::Continue(())
-    })
-    .unwrap()
-    .unwrap();
+    let (whole, stages) = lines_at_once(&settings, &setup);
     let wanted = lines_told(&settings, &setup, &whole);
     // A resumed run writes over what it had written when it was interrupted.
     let folder = tempfile::tempdir().unwrap();
@@ -383,14 +387,8 @@ fn cold_searches_are_resumed_bit_for_bit_from_every_stage() {
             ..base
         };
         let setup = raceline::set_up(&settings).unwrap();
-        let mut all = 0;
-        let mut steps = Steps::default();
-        let whole = solve::<Raceline>(&settings, &setup, (None, &mut StateFile::idle()), |p| {
-            all += usize::from(steps.is_next(p));
-            ControlFlow::Continue(())
-        })
-        .unwrap()
-        .unwrap();
+        let (whole, stages) = lines_at_once(&settings, &setup);
+        let all = stages.len();
         let wanted = lines_told(&settings, &setup, &whole);
         let breaks: Vec<usize> = (1..8).map(|k| 1 + k * (all - 1) / 8).collect();
         lines_in_pieces((&settings, &setup), &breaks, (&wanted, all));
@@ -408,16 +406,10 @@ fn sectors_are_joined_and_resumed_bit_for_bit() {
         ..lines()
     };
     let setup = raceline::set_up(&settings).unwrap();
-    let mut seen = 0;
-    let mut steps = Steps::default();
-    let whole = solve::<Raceline>(&settings, &setup, (None, &mut StateFile::idle()), |p| {
-        seen += usize::from(steps.is_next(p));
-        ControlFlow::Continue(())
-    })
-    .unwrap()
-    .unwrap();
-    // Its mutants are evaluated beside the particles.
+    let (whole, stages) = lines_at_once(&settings, &setup);
+    let seen = stages.len();
     assert_eq!(seen, 4 * 40);
+    // Its mutants are evaluated beside the particles.
     assert!(whole.record.evaluations > 4 * 40 * 16);
     let wanted = lines_told(&settings, &setup, &whole);
     lines_in_pieces((&settings, &setup), &[1, 39, 40, 41, 97, 160], (&wanted, seen));
@@ -461,16 +453,7 @@ fn particle_swarms_are_resumed_bit_for_bit() {
             ..lines()
         };
         let setup = raceline::set_up(&settings).unwrap();
-        let mut stages: Vec<String> = Vec::new();
-        let mut steps = Steps::default();
-        let whole = solve::<Raceline>(&settings, &setup, (None, &mut StateFile::idle()), |p| {
-            if steps.is_next(p) {
-                stages.push(p.stage.clone());
-            }
-            ControlFlow::Continue(())
-        })
-        .unwrap()
-        .unwrap();
+        let (whole, stages) = lines_at_once(&settings, &setup);
         let wanted = lines_told(&settings, &setup, &whole);
         let all = stages.len();
         let fastest = 1 + stages.iter().position(|s| s == "fastest").unwrap();

@@ -31,9 +31,8 @@ pub use verdict::{Untold, Verdict};
 
 use crate::config::settings::Settings;
 use crate::error::Result;
-use crate::evaluate::replay::open_evaluator;
+use crate::evaluate::replay::{CHANNEL_LABELS, open_evaluator};
 use crate::evaluate::{PackedClient, run_packed};
-use crate::report::with_unit;
 use crate::study::framework::memory::{MemoryItem, Size};
 use crate::study::framework::state_file::StateFile;
 use crate::study::framework::{
@@ -223,11 +222,14 @@ impl Study for Identify {
 
     fn searched(solved: &Solved<'_, Self>) -> Searched {
         let outcome = solved.outcome;
-        let objectives = &solved.prepared.replay.problem.objectives;
-        let objectives = objectives.iter().map(|o| match &*o.name {
-            "all" => "cost of all channels".to_owned(),
-            channel => with_unit(&format!("cost of {channel}"), &o.unit),
-        });
+        let objectives = solved
+            .settings
+            .objectives
+            .iter()
+            .map(|objective| match objective {
+                ObjectiveChoice::All => "cost of all channels".to_owned(),
+                ObjectiveChoice::Channel(k) => format!("cost of {}", CHANNEL_LABELS[*k]),
+            });
         let (reached, front) = match &outcome.front {
             Some(front) => (front.reached.clone(), front.objectives.clone()),
             None => {

@@ -8,7 +8,7 @@ use crate::config::settings::{Flag, settings};
 use crate::error::{Error, Result};
 use crate::evaluate::line::LineObjective;
 use crate::evaluate::{BackendChoice, Problem};
-use crate::line::CarPlan;
+use crate::line::{CarPlan, TERMS};
 use crate::study::framework::memory::Size;
 use crate::study::framework::setups::{MOST_SETUPS, check_parameters};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
@@ -87,7 +87,7 @@ settings! {
         mutation: Option<Mutation> ["-"] = None, of(Mutated).search().example("0.95"),
             "Mutation with thesis: an exponent from 0 (none) to 10, random or polynomial; without it the algorithm's own";
         sectors: usize ["-"] = 1, count(1, 1000).search(),
-            "Sectors of equally many cross-sections in which thesis looks for a line one after another, each from where the one before ends";
+            "Sectors in which thesis looks for the line, one after another, each from where the one before ends; 1 is the whole line";
         groups: usize ["-"] = 12, count(1, 1_000_000).search(),
             "Groups of neighbouring cross-sections of the cooperative algorithm";
         population: usize ["-"] = 200, count(8, 10_000_000).search(),
@@ -188,6 +188,16 @@ impl RacelineSettings {
                 "1, or one of the objectives length, gamma and kappa2",
             ),
         }
+    }
+
+    /// Refuses sectors of too few cross-sections for a line.
+    pub(super) fn check_sectors_of(&self, sections: usize) -> Result<()> {
+        if self.sectors == 1 || sections / self.sectors >= TERMS {
+            return Ok(());
+        }
+        let found = format!("{} of {sections} cross-sections", self.sectors);
+        let expected = format!("sectors of {TERMS} cross-sections at least");
+        Err(Error::input("the study", "sectors", found, expected))
     }
 
     /// Whether the swarms start from the reference optima.

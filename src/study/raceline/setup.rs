@@ -1,6 +1,5 @@
 //! The track, the car and lines as a study reports them.
 
-use super::results::sectors;
 use super::settings::RacelineSettings;
 use crate::config::settings::Settings;
 use crate::error::{Error, Result};
@@ -52,7 +51,7 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let track = Track::load(&settings.track)?;
     let few = track.cross_sections(&Spacing::equal(FEW), settings.as_surveyed)?;
     let sections = settings.sections_on(few.length_m);
-    sectors::check(settings, sections, TERMS)?;
+    settings.check_sectors_of(sections)?;
     let road = track
         .cross_sections(&Spacing::equal(sections), settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);
@@ -214,14 +213,22 @@ impl Setup {
         objectives: &[LineObjective],
         settings: &RacelineSettings,
     ) -> Result<LineProblem> {
+        self.problem_on(self.cross_sections.clone(), way, objectives, settings)
+    }
+
+    /// The problem of lines through other cross-sections, such as those of a sector.
+    ///
+    /// # Errors
+    /// Those of [`LineProblem::new`].
+    pub(super) fn problem_on(
+        &self,
+        cross_sections: CrossSections,
+        way: Parametrisation,
+        objectives: &[LineObjective],
+        settings: &RacelineSettings,
+    ) -> Result<LineProblem> {
         let car = Some(self.car.clone());
-        LineProblem::new(
-            self.cross_sections.clone(),
-            way,
-            objectives,
-            car,
-            settings.entry_mps,
-        )
+        LineProblem::new(cross_sections, way, objectives, car, settings.entry_mps)
     }
 
     /// The solvers of reference optima, ended by `stop`. Their fastest lines keep the car between the edges.

@@ -71,13 +71,17 @@ impl WholeLineSwarm {
     }
 }
 
-/// The cross-sections of the sector that follows those that are done with, of `alpha` `before`. It begins at the last one before,
-/// where the line is held: only the link from the last sector to the first belongs to none.
+/// The cross-sections of the sector after those whose line is found, with `alpha` `before`. It begins with the last cross-section
+/// before, where the line is held.
 fn next_sector(settings: &RacelineSettings, setup: &Setup, before: &[f64]) -> Result<CrossSections> {
     let all = &setup.cross_sections;
-    let (n, first) = (all.len(), before.len());
-    let end = (1..=settings.sectors).map(|k| k * n / settings.sectors);
-    let end = end.into_iter().find(|end| *end > first).unwrap_or(n);
+    if settings.sectors == 1 {
+        return Ok(all.clone());
+    }
+    let sectors = (0..settings.sectors).map(|number| all.sector(number, settings.sectors));
+    let first = before.len();
+    let end = sectors.map(|sector| sector.end).find(|end| *end > first);
+    let end = end.unwrap_or(all.len());
     let Some(last) = before.last() else {
         return all.stretch(0, end);
     };
@@ -94,63 +98,51 @@ pub(super) fn search_whole_lines(
     objective: LineObjective,
     work: &mut Running<'_>,
 ) -> Result<FoundLine> {
-    let whole = setup.problem(Parametrisation::sections(), &[objective], settings)?;
+    let way = Parametrisation::sections();
     let problem_after = |before: &[f64]| -> Result<LineProblem> {
-        if settings.sectors == 1 {
-            return Ok(whole.clone());
-        }
         let sector = next_sector(settings, setup, before)?;
-        let car = Some(setup.car.clone());
-        LineProblem::new(
-            sector,
-            Parametrisation::sections(),
-            &[objective],
-            car,
-            settings.entry_mps,
-        )
+        setup.problem_on(sector, way.clone(), &[objective], settings)
     };
-    let mut state = work.state.whole_lines.take().map(|state| *state);
+    let (mut state, mut problem) = match work.state.whole_lines.take() {
+        Some(state) => {
+            let problem = problem_after(&state.before)?;
+            (*state, problem)
+        }
+        None => {
+            let problem = problem_after(&[])?;
+            (WholeLineState::new(settings, &problem)?, problem)
+        }
+    };
     loop {
-        let before = state.as_ref().map_or(&[][..], |state| &state.before);
-        let problem = problem_after(before)?;
-        let mut at_work = match state {
-            Some(state) => state,
-            None => WholeLineState::new(settings, &problem)?,
-        };
-        let (interrupted, backend) = at_work.search(&problem, settings, setup, objective, work)?;
-        let swarm = at_work.swarm.swarm();
+        let (interrupted, backend) = state.search(&problem, settings, setup, objective, work)?;
+        let swarm = state.swarm.swarm();
         let front = swarm.front();
         let Some(best) = front.candidates.first() else {
             return Err(Error::Study(
                 "none of the lines that were tried could be evaluated".to_owned(),
             ));
         };
-        let alpha = problem.alpha(best);
         // A sector begins with the last cross-section of the one before.
-        let held = usize::from(!at_work.before.is_empty());
-        at_work.spent += swarm.evaluations();
-        at_work.before.extend_from_slice(&alpha[held..]);
-        let missing = setup.cross_sections.len() - at_work.before.len();
+        let held = usize::from(!state.before.is_empty());
+        state.spent += swarm.evaluations();
+        state.before.extend_from_slice(&problem.alpha(best)[held..]);
+        let missing = setup.cross_sections.len() - state.before.len();
         if interrupted || missing == 0 {
-            // Of an interrupted search there is a line all the same, for what is reported then.
-            at_work.before.extend(std::iter::repeat_n(0.5, missing));
-            let cost = CpuLineEvaluator::new(&whole)
-                .evaluate(&at_work.before)?
-                .objectives[0];
+            // An interrupted search reports a line all the same.
+            state.before.extend(std::iter::repeat_n(0.5, missing));
+            let whole = setup.problem(way.clone(), &[objective], settings)?;
+            let judged = CpuLineEvaluator::new(&whole).evaluate(&state.before)?;
             return Ok(FoundLine {
-                alpha: at_work.before,
-                cost,
-                evaluations: at_work.spent,
-                history: at_work.history,
-                losses: at_work.losses,
+                alpha: state.before,
+                cost: judged.objectives[0],
+                evaluations: state.spent,
+                history: state.history,
+                losses: state.losses,
                 backend: Some(backend),
             });
         }
-        let next = problem_after(&at_work.before)?;
-        state = Some(WholeLineState {
-            swarm: WholeLineState::new(settings, &next)?.swarm,
-            ..at_work
-        });
+        problem = problem_after(&state.before)?;
+        state.swarm = WholeLineState::new(settings, &problem)?.swarm;
     }
 }
 

@@ -330,8 +330,13 @@ impl Summary {
                     &item.about,
                 );
                 page.table("Published and ours", &table.took(), &table.columns())?;
-                for row in table.rows.iter().filter(|row| !row.differs.is_empty()) {
-                    page.paragraph(&format!("{}: {}", row.figure, row.differs));
+                // Rows of one figure have one sentence.
+                let differing = table.rows.iter().filter(|row| !row.differs.is_empty());
+                let sentences = differing.map(|row| format!("{}: {}", row.figure, row.differs));
+                let mut sentences: Vec<String> = sentences.collect();
+                sentences.dedup();
+                for sentence in &sentences {
+                    page.paragraph(sentence);
                 }
                 for failed in &table.failed_runs {
                     page.warning(format!("{}: {failed}", item.title));

@@ -116,7 +116,7 @@ fn panel(summary: &Summary, figure: &str) -> Option<BarPanel> {
     Some(BarPanel::new(&*name, with_unit(&name, unit), names).strips(singles, &quartiles))
 }
 
-/// Whether a run is one of a group.
+/// Whether a run is one of a group: its settings, the seed aside, are the group's.
 fn is_of(row: &Row, group: &Group) -> bool {
     let rest = row.settings.iter().filter(|(key, _)| *key != "seed");
     rest.eq(group.settings.iter())
@@ -166,7 +166,7 @@ fn searches(page: &mut HtmlReport, folder: &Path, summary: &Summary, kept: &[Kep
             (only, "The best that the swarm had found")
         };
         let figure = super::ways::figure(&ways, &label);
-        // Files of one name for the only objectives, and else with their number.
+        // Pictures of the first objectives have plain names, those of others have a number.
         let named = |stem: &str| match number {
             0 => folder.join(format!("{stem}.svg")),
             _ => folder.join(format!("{stem}_{}.svg", number + 1)),

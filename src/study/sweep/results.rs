@@ -154,14 +154,11 @@ pub(super) fn write_rows(folder: &Path, kept: &[KeptRow]) -> Result<()> {
 }
 
 impl Summary {
-    /// The figures of these rows, whose fronts stay theirs.
+    /// The figures of these rows, without their fronts.
     pub(super) fn new(kept: &[KeptRow], failed_runs: Vec<String>, missing_runs: usize) -> Self {
         let without_front = |kept: &KeptRow| Row {
-            run: kept.row.run,
-            settings: kept.row.settings.clone(),
-            figures: kept.row.figures.clone(),
-            device_faults: kept.row.device_faults.clone(),
             front: Vec::new(),
+            ..kept.row.clone()
         };
         let rows: Vec<Row> = kept.iter().map(without_front).collect();
         Self {

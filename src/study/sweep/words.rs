@@ -1,4 +1,6 @@
-//! Figures of studies in words with their units: their names are those of files.
+//! Figures of studies in words with their units. Files have their names.
+
+use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_NAMES, CHANNEL_UNITS};
 
 /// How names end that have a unit, and the unit. Longer endings come before those that they end with.
 const UNITS: [(&str, &str); 22] = [
@@ -34,14 +36,6 @@ const BEGINNINGS: [(&str, &str); 6] = [
     ("relative_error_", "relative error"),
     ("swarm_", "by the swarm"),
 ];
-/// Channels in words, with their units.
-const CHANNELS: [(&str, &str, &str); 4] = [
-    ("ax", "longitudinal acceleration", "m/s^2"),
-    ("ay", "lateral acceleration", "m/s^2"),
-    ("vx", "speed", "m/s"),
-    ("yaw_rate", "yaw rate", "rad/s"),
-];
-
 /// Whether a figure is one of many of its kind, which tables of their own have.
 pub(super) fn is_detail(figure: &str) -> bool {
     ["value_", "relative_error_", "mse_"]
@@ -55,14 +49,15 @@ pub(super) fn words(figure: &str) -> (String, &'static str) {
         let Some(rest) = figure.strip_prefix(beginning) else {
             continue;
         };
-        let channel = CHANNELS.iter().find(|(name, ..)| *name == rest);
+        let channel = CHANNEL_NAMES.iter().position(|name| *name == rest);
+        let channel = channel.map(|k| (CHANNEL_LABELS[k], CHANNEL_UNITS[k]));
         return match (beginning, channel) {
-            // Names of parameters are their own words, and so are their units.
+            // Names of parameters are their own words, and their units are the parameters'.
             ("value_" | "relative_error_", _) => (format!("{what} of {rest}"), ""),
             // Costs count in spreads of the channel, by the norm.
-            ("cost_", Some((_, words, _))) => (format!("{what} of {words}"), ""),
-            ("mse_", Some((_, words, unit))) => (format!("{what} of {words}"), squared(unit)),
-            (_, Some((_, words, unit))) => (format!("{what} of {words}"), unit),
+            ("cost_", Some((words, _))) => (format!("{what} of {words}"), ""),
+            ("mse_", Some((words, unit))) => (format!("{what} of {words}"), squared(unit)),
+            (_, Some((words, unit))) => (format!("{what} of {words}"), unit),
             _ => {
                 let (rest, unit) = spelled(rest);
                 (format!("{rest}, {what}"), unit)

@@ -1,8 +1,8 @@
 //! A line that was looked for sector by sector: what each is long, and the links between them.
 
+use crate::Result;
 use crate::report::{HtmlReport, Table};
 use crate::study::raceline::{RacelineSettings, ReportedLine, Setup};
-use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// A sector of a line.
@@ -28,18 +28,18 @@ pub(super) fn of(settings: &RacelineSettings, setup: &Setup, line: &ReportedLine
         _ if setup.cross_sections.closed => points[i].distance(points[0]),
         _ => 0.0,
     };
-    let sector = |k: usize| {
-        let (first, end) = (k * n / settings.sectors, (k + 1) * n / settings.sectors);
+    let sector = |number: usize| {
+        let sector = setup.cross_sections.sector(number, settings.sectors);
         SectorFigures {
-            sections: end - first,
-            length_m: (first..end - 1).map(step_m).sum(),
-            link_m: step_m(end - 1),
+            sections: sector.len(),
+            link_m: step_m(sector.end - 1),
+            length_m: (sector.start..sector.end - 1).map(step_m).sum(),
         }
     };
     (0..settings.sectors).map(sector).collect()
 }
 
-/// Lengths of all sectors, and of all links between them (m).
+/// Lengths of all sectors, and of all links between them (m); none where the line was looked for at once.
 pub fn lengths_m(sectors: &[SectorFigures]) -> Option<[f64; 2]> {
     let sum = |of: fn(&SectorFigures) -> f64| sectors.iter().map(of).sum();
     (!sectors.is_empty()).then(|| [sum(|s| s.length_m), sum(|s| s.link_m)])
@@ -73,17 +73,4 @@ pub(super) fn place(page: &mut HtmlReport, sectors: &[SectorFigures]) -> Result<
         .number("link to the next", "m", |(_, s)| s.link_m)
         .table();
     page.table("Sector by sector", "", &table)
-}
-
-/// Refuses sectors of too few cross-sections for a line.
-///
-/// # Errors
-/// [`Error::Input`] naming the setting.
-pub fn check(settings: &RacelineSettings, sections: usize, least: usize) -> Result<()> {
-    if settings.sectors == 1 || sections / settings.sectors >= least {
-        return Ok(());
-    }
-    let found = format!("{} of {sections} cross-sections", settings.sectors);
-    let expected = format!("sectors of {least} cross-sections at least");
-    Err(Error::input("the study", "sectors", found, expected))
 }
