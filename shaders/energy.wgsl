@@ -4,7 +4,7 @@
 // STRATEGY on. The constants STRATEGY, ADDITIONAL, COUNTS_CHARGE, FLOWS_AT, BOOSTS_AT and ZONES_AT are generated: where in
 // `energy` the flows, the boosts and the zones begin, after the forces. So is binding 10, `energy`, an array of vectors of four:
 // rows of engine, motor, generator, drag and of their rises; of flows at four loads and of their rises; of the motor, the room
-// for it, what the MGU-H takes, zero and of their rises; of each section's zone, position and one over its share.
+// for it, what the MGU-H takes and adds, and of their rises; of each section's zone, position and one over its share.
 
 // Twin of `EnergyAccount` in `src/evaluate/energy/gpu.rs`.
 struct EnergyAccount {
@@ -18,6 +18,8 @@ struct EnergyAccount {
     store_room: f32,
     exhaust_gain: f32,
     exhaust_cost: f32,
+    assist_extra: f32,
+    assist_share: f32,
     exhaust_from: f32,
     exhaust_to_ax: f32,
     rows_per_speed_squared: f32,
@@ -37,6 +39,7 @@ struct EnergyState {
 struct Step {
     end: f32,
     motor: f32,
+    assist: f32,
 }
 
 struct SegmentEnergy {
@@ -125,9 +128,17 @@ fn additional(
     let figures = energy[BOOSTS_AT + 2u * row] + (held - f32(row)) * energy[BOOSTS_AT + 2u * row + 1u];
     let greatest = min(figures.x * gates.motor, figures.y);
     let may = gates_open(here, start) && gates.ax < alone - first.z;
-    let wanted = select(0.0, greatest * zone_share(section, candidate), may);
+    let share = zone_share(section, candidate);
     let inverse = 1.0 / length;
-    let boost = min(wanted, left * account.force_per_deployed * inverse / account.rotating);
+    let reach = left * account.force_per_deployed * inverse / account.rotating;
+    let slow = start < account.exhaust_from;
+    let gain = select(0.0, min(figures.w, figures.y - greatest), slow);
+    // The MGU-K first, whose joules are cheaper.
+    let both_wanted = select(0.0, (greatest + gain) * share, may);
+    let wanted = min(both_wanted, greatest);
+    let own = min(wanted, reach);
+    let assist = min(both_wanted - wanted, (reach - own) * account.assist_share);
+    let boost = own + assist;
 
     let turns = spins(start, min(first.x, first.y + boost) - first.z) && LEAST_J < space;
     let exhaust = select(0.0, figures.z, turns);
@@ -142,9 +153,10 @@ fn additional(
     let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later_drive)));
     let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
     let end = min(reached, most);
-    // Where less force is needed than both can give, the motor is reduced first.
+    // Where less force is needed than both can give, the motor is reduced first, and of the motors the dearer one.
     let spare = 0.5 * (reached - end) * inverse;
-    return Step(end, max(motor - spare, 0.0));
+    let motors = max(motor - spare, 0.0);
+    return Step(end, motors, min(assist, max(motors - own, 0.0)));
 }
 
 fn engine_only(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
@@ -171,7 +183,8 @@ fn provisional(
     let space = store_space(*state);
     let step = additional(section, start, length, here, there, most, store_left(*state), space, candidate);
     let joules = account.mass * length;
-    let deployed = joules * (account.rotating * step.motor) * account.deploy_cost;
+    let deployed = joules * (account.rotating * step.motor) * account.deploy_cost
+        + joules * (account.rotating * step.assist) * account.assist_extra;
     (*state).speed_squared = step.end;
     (*state).deployed = (*state).deployed + deployed;
     (*state).change = (*state).change - deployed;
@@ -220,7 +233,7 @@ fn segment_energy(
     if ADDITIONAL {
         step = additional(section, start, length, here, there, most, left, space, candidate);
     } else {
-        step = Step(engine_only(section, start, length, here, there, most), 0.0);
+        step = Step(engine_only(section, start, length, here, there, most), 0.0, 0.0);
     }
     let end = step.end;
     let mean = 0.5 * (start + end);
@@ -240,8 +253,11 @@ fn segment_energy(
     let shed = max(-force, 0.0);
     let joules = account.mass * length;
     var motor: f32;
+    var assist = 0.0;
     if ADDITIONAL {
         motor = min(account.rotating * step.motor, demand);
+        let unneeded = account.rotating * step.motor - motor;
+        assist = max(account.rotating * step.assist - unneeded, 0.0);
     } else {
         let may = gates_open(here, start) && gates.ax < ax;
         let share = zone_share(section, candidate);
@@ -252,7 +268,7 @@ fn segment_energy(
     let unharvested = min(account.harvest_most - (*state).harvested_k, space);
     let room = unharvested * account.force_per_harvested * inverse;
     let generator = min(min(shed, forces.z * gates.motor), max(room, 0.0));
-    let deployed = joules * motor * account.deploy_cost;
+    let deployed = joules * motor * account.deploy_cost + joules * assist * account.assist_extra;
     let harvested_k = joules * generator * account.harvest_gain;
 
     let flows = energy[FLOWS_AT + 2u * row] + beyond * energy[FLOWS_AT + 2u * row + 1u];
@@ -263,7 +279,8 @@ fn segment_energy(
     let spare = joules * max(forces.x - engine, 0.0) / max(account.exhaust_cost, LEAST_COST);
     let driving = min(engine / max(forces.x, 1e-3), 1.0);
     let exhaust = account.exhaust_gain * (flow_at(flows, driving) * time);
-    let harvested_h = select(0.0, min(min(exhaust, spare), space_left), spins(mean, ax));
+    let turns = spins(mean, ax) && !(0.0 < assist);
+    let harvested_h = select(0.0, min(min(exhaust, spare), space_left), turns);
     let crank = engine + account.exhaust_cost * harvested_h / joules;
     let load = min(crank / max(forces.x, 1e-3), 1.0);
 

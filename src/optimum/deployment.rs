@@ -1,15 +1,16 @@
 //! The deployment of a motor's energy that saves most time on a fixed line.
 //!
-//! Speeds squared and what the motor adds to the acceleration of each segment are the unknowns: the energy is linear in the latter,
+//! Speeds squared and what the motors add to the acceleration of each segment are the unknowns: the energy is linear in the latter,
 //! and what the tyres still transmit bounds it. The lap time is a convex function of the speeds squared, and braking bounds them from
-//! above whatever the motor does. Only the acceleration by engine, tyres and motor is not linear. It is linearised about the last
-//! lap in a sequence of cone programs, which leads to the optimum; after each program the full lap is computed. After S. Ebbesen, M. Salazar, P. Elbert, C. Bussi and C. H.
-//! Onder, *Time-optimal control strategies for a hybrid electric race car*, IEEE Trans. Control Syst. Technol. 26, 2018.
+//! above whatever the motors do. The MGU-H's motor has its own price: it is used after the MGU-K, so that the energy stays convex. Only
+//! the acceleration by engine, tyres and motors is not linear. It is linearised about the last lap in a sequence of cone programs, which
+//! leads to the optimum; after each program the full lap is computed. After S. Ebbesen, M. Salazar, P. Elbert, C. Bussi and C. H. Onder, *Time-optimal control strategies for a
+//! hybrid electric race car*, IEEE Trans. Control Syst. Technol. 26, 2018.
 
 use super::conic::{Affine, ConicProgram, Status};
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy};
-use crate::line::energy::kernel::motor_step;
+use crate::line::energy::kernel::motors_step;
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
 use crate::line::kernel::{Course, may_open};
 use glam::DVec2;
@@ -63,7 +64,6 @@ const SQUARE: f64 = 1000.0;
 const DERIVATIVE: f64 = 1e-4;
 /// Least speed squared about which that share is taken (m^2/s^2): a car may start from a standstill.
 const LEAST_SQUARE: f64 = 1.0;
-
 /// Motor's part of the acceleration (m/s^2) below which a segment has no use for it.
 const LEAST_MOTOR: f64 = 1e-9;
 /// Halvings of the share that gives a wanted part: to the last bit of a double.
@@ -72,8 +72,9 @@ const HALVINGS: usize = 52;
 const SMALL_MOVE: f64 = 0.05;
 /// Energy of a lap that may deploy as much as it wants to (J).
 const UNBOUND_J: f64 = 1e12;
-/// How near a lap comes to the energy that it is to spend, as a share of it, and in how many rounds at the most.
+/// How near a lap comes to the energy that it is to spend, as a share of it,
 const SPENT: f64 = 1e-6;
+/// and in how many rounds at the most.
 const ROUNDS: usize = 6;
 
 /// A segment about the last lap.
@@ -87,8 +88,12 @@ struct Linear {
     /// The most that it can be, and its derivative by the speed squared.
     most: f64,
     most_by_square: f64,
-    /// Energy for each m/s^2 of it (J).
+    /// The most of it by the MGU-K, and its derivative by the speed squared.
+    own: f64,
+    own_by_square: f64,
+    /// Energy for each m/s^2 of it (J), and what each costs more that the MGU-H adds.
     cost: f64,
+    extra: f64,
 }
 
 impl DeploymentSearch<'_> {
@@ -164,6 +169,7 @@ impl DeploymentSearch<'_> {
                 squares: &squares,
                 end: segments.last().map_or(0.0, |s| s.end),
                 linear: &linear,
+                assists: self.car.table.assists,
                 energy_j,
                 reach,
             };
@@ -205,11 +211,12 @@ impl DeploymentSearch<'_> {
         })
     }
 
-    /// The speed squared at the end of segment `i` and the motor's part of the acceleration (m/s^2) there.
-    fn step(&self, course: &Course<f64>, i: usize, square: f64, share: f64) -> [f64; 2] {
+    /// The speed squared at the end of segment `i`, the part of the acceleration there (m/s^2) by the motors, and the MGU-H's part of
+    /// it.
+    fn step(&self, course: &Course<f64>, i: usize, square: f64, share: f64) -> [f64; 3] {
         let (curvature, n) = (&course.curvature, course.curvature.len());
         let bends = ([curvature[i], curvature[(i + 1) % n]], may_open(self.drs, i));
-        motor_step(
+        motors_step(
             &self.car.envelope_table,
             &self.car.table,
             square,
@@ -221,12 +228,12 @@ impl DeploymentSearch<'_> {
 
     fn linear(&self, course: &Course<f64>, i: usize, square: f64, share: f64) -> Linear {
         let step = |square: f64, share: f64| self.step(course, i, square, share);
-        let [reached, motor] = step(square, share);
+        let [reached, motor, _] = step(square, share);
         let around = DERIVATIVE * square.max(LEAST_SQUARE);
         let (below, above) = ((square - around).max(0.0), square + around);
         let slopes = |share: f64| {
             let (low, high) = (step(below, share), step(above, share));
-            [0, 1].map(|k| (high[k] - low[k]) / (above - below))
+            [0, 1, 2].map(|k| (high[k] - low[k]) / (above - below))
         };
         let (none, all) = (step(square, 0.0), step(square, 1.0));
         let by_motor = if all[1] > LEAST_MOTOR {
@@ -234,7 +241,9 @@ impl DeploymentSearch<'_> {
         } else {
             0.0
         };
-        let [reached_by_square, motor_by_square] = slopes(share);
+        let [reached_by_square, motor_by_square, _] = slopes(share);
+        let [_, most_by_square, assist_by_square] = slopes(1.0);
+        let table = &self.car.table;
         Linear {
             reached,
             // A greater speed at the start never gives a smaller one at the end. At the limit of grip a finite step may suggest
@@ -243,13 +252,16 @@ impl DeploymentSearch<'_> {
             by_motor,
             motor,
             most: all[1],
-            most_by_square: slopes(1.0)[1],
-            cost: self.car.table.mass * self.car.table.deploy_cost * course.length[i],
+            most_by_square,
+            own: all[1] - all[2],
+            own_by_square: most_by_square - assist_by_square,
+            cost: table.mass * table.deploy_cost * course.length[i],
+            extra: table.mass * table.assist_extra * course.length[i],
         }
     }
 
-    /// The shares with which the motor does what is asked, a little less of it everywhere, or more, so that it takes the energy that
-    /// the program thought it would: a lap whose store runs out loses all at its end.
+    /// The shares of the motor's force for what a program asks. All that is asked is scaled until the lap spends the energy that the
+    /// program counted on: a lap whose store runs out loses time at its end.
     fn spending(
         &self,
         energy_j: f64,
@@ -259,15 +271,15 @@ impl DeploymentSearch<'_> {
         asked: &[Asked],
         shares: &[f64],
     ) -> Vec<f64> {
-        let thought_j: f64 = asked
+        let counted_on_j: f64 = asked
             .iter()
             .zip(linear)
-            .map(|(asked, of)| of.cost * asked.motor)
+            .map(|(asked, of)| of.cost * asked.motor + of.extra * asked.assist)
             .sum();
-        let all_of_it = thought_j > (1.0 - SPENT) * energy_j;
+        let all_of_it = counted_on_j > (1.0 - SPENT) * energy_j;
         let (mut shares, mut scale) = (shares.to_vec(), 1.0);
         for _ in 0..ROUNDS {
-            for (i, Asked { square, motor }) in asked.iter().enumerate() {
+            for (i, Asked { square, motor, .. }) in asked.iter().enumerate() {
                 shares[i] = self.share(course, i, *square, scale * motor);
             }
             let spent = unbound.lap(&shares).0.deployed / energy_j;
@@ -305,8 +317,10 @@ impl DeploymentSearch<'_> {
 struct Asked {
     /// Speed squared at its start (m^2/s^2).
     square: f64,
-    /// The motor's part of the acceleration (m/s^2).
+    /// The motors' part of the acceleration (m/s^2),
     motor: f64,
+    /// and the MGU-H's of that.
+    assist: f64,
 }
 
 /// The cone program about a lap.
@@ -318,6 +332,8 @@ struct Program<'a> {
     /// Speed squared at the end of the last segment.
     end: f64,
     linear: &'a [Linear],
+    /// Whether the MGU-H drives beside the MGU-K, at its own price.
+    assists: bool,
     energy_j: f64,
     reach: f64,
 }
@@ -345,6 +361,11 @@ impl Program<'_> {
             upper.push(linear.motor + reach);
         }
         let (root, inverse, motor) = (points, 2 * points, 2 * points + segments);
+        let assist = motor + segments;
+        if self.assists {
+            lower.extend(vec![0.0; segments]);
+            upper.extend(vec![f64::INFINITY; segments]);
+        }
         let mut program = ConicProgram::new(lower, upper).for_step(1e-8, 1e-8);
         let affine = |constant: f64, terms: Vec<(usize, f64)>| Affine { constant, terms }.merged();
         for i in 0..points {
@@ -389,6 +410,18 @@ impl Program<'_> {
                 vec![(i, linear.most_by_square * SQUARE), (motor + i, -1.0)],
             ));
             budget.terms.push((motor + i, -linear.cost));
+            if self.assists {
+                // What the MGU-K does not give.
+                program.add_nonnegative(affine(
+                    linear.own - linear.own_by_square * self.squares[i],
+                    vec![
+                        (i, linear.own_by_square * SQUARE),
+                        (motor + i, -1.0),
+                        (assist + i, 1.0),
+                    ],
+                ));
+                budget.terms.push((assist + i, -linear.extra));
+            }
         }
         let scale = self.energy_j.max(1e3).recip();
         budget.constant *= scale;
@@ -397,10 +430,10 @@ impl Program<'_> {
         }
         program.add_nonnegative(budget.merged());
         let solution = program.solve()?;
-        let both = solution.x[..segments].iter().zip(&solution.x[motor..]);
-        let asked = both.map(|(square, motor)| Asked {
-            square: SQUARE * square,
-            motor: motor.max(0.0),
+        let asked = (0..segments).map(|i| Asked {
+            square: SQUARE * solution.x[i],
+            motor: solution.x[motor + i].max(0.0),
+            assist: solution.x.get(assist + i).map_or(0.0, |assist| assist.max(0.0)),
         });
         Ok((asked.collect(), solution.lower_bound, solution.status))
     }

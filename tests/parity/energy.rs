@@ -28,13 +28,14 @@ fn hybrid_car(exponent: f64) -> EnergyCar {
         powertrain.rotating_mass_factor = 1.06;
     }
     if exponent < 2.0 {
-        // Such that the MGU-H turns at full load too, which the bundled rule allows nowhere on these lines.
+        // Such that the MGU-H turns at full load too, which the bundled rule allows nowhere on these lines, and drives the compressor.
         let h = car
             .hybrid
             .as_mut()
             .and_then(|hybrid| hybrid.mgu_h.as_mut())
             .expect("bundled");
-        (h.from_speed_mps, h.to_ax_mps2) = (30.0, 3.0);
+        (h.from_speed_mps, h.to_ax_mps2) = (45.0, 3.0);
+        (h.motor_w, h.motor_gain_w) = (60e3, 20e3);
     }
     let coarse = SpeedRange {
         step_mps: 8.0,
@@ -154,6 +155,12 @@ fn laps_with_energy_agree_and_balance() {
         let slices: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
         let expected = driven(CpuHybridEvaluator::new(&problem).outcomes(&slices));
         check_books(&name, &problem, &expected, f64::EPSILON);
+        let assists = |row: &Vec<f64>| problem.lap(row).1.iter().any(|s| s.assist > 0.0);
+        assert_eq!(
+            rows.iter().any(assists),
+            problem.car().table.assists && problem.energy().mode == Mode::Additional,
+            "{name}"
+        );
         let mut found: Vec<(String, Vec<EnergyLap<f64>>)> = Vec::new();
         for set in InstructionSet::available() {
             let laps = driven(SimdHybridEvaluator::new(&problem, set).outcomes(&slices));

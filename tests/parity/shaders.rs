@@ -323,6 +323,8 @@ fn the_struct_of_energies_has_the_hosts_offsets() {
         ("store_room", offset_of!(EnergyAccount, store_room)),
         ("exhaust_gain", offset_of!(EnergyAccount, exhaust_gain)),
         ("exhaust_cost", offset_of!(EnergyAccount, exhaust_cost)),
+        ("assist_extra", offset_of!(EnergyAccount, assist_extra)),
+        ("assist_share", offset_of!(EnergyAccount, assist_share)),
         ("exhaust_from", offset_of!(EnergyAccount, exhaust_from)),
         ("exhaust_to_ax", offset_of!(EnergyAccount, exhaust_to_ax)),
         (

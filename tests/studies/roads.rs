@@ -5,7 +5,7 @@ use lapswarm::error::Error;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::line::{FineLine, read_line};
-use lapswarm::optimum::DeploymentSearch;
+use lapswarm::optimum::{DeploymentSearch, Status};
 use lapswarm::random::Random;
 use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::hybrid::{HybridStudySettings, set_up as hybrid_set_up};
@@ -381,6 +381,40 @@ fn deployments_start_from_a_standstill() {
         .expect_err("a short start")
         .to_string();
     assert!(error.contains("start") && error.contains("3 shares"), "{error}");
+}
+
+/// With energy enough the MGU-H's motor makes the best lap faster, at its own price; with little, no more is spent than there is.
+#[test]
+fn deployments_pay_for_the_turbocharger_s_motor() {
+    let settings = HybridStudySettings {
+        track: "stadium:400:120:14".to_owned(),
+        sections: Some(60),
+        backend: BackendChoice::Simd,
+        ..HybridStudySettings::default()
+    };
+    let mut setup = hybrid_set_up(&settings).expect("a hybrid car");
+    let mut best = |gain_kw: f64, energy_j: f64| {
+        let mut hybrid = setup.car.hybrid.clone();
+        let h = hybrid.mgu_h.as_mut().expect("bundled");
+        (h.motor_w, h.motor_gain_w) = (3e3 * gain_kw, 1e3 * gain_kw);
+        setup.car = setup.car.with_hybrid(hybrid).expect("a car");
+        let found = setup.exact(energy_j, None).expect("a lap");
+        assert!(
+            found.lap.deployed <= energy_j * (1.0 + 1e-6),
+            "{}",
+            found.lap.deployed
+        );
+        (found.lap, found.status)
+    };
+    let ((with, ended), (without, _)) = (best(20.0, 2e7), best(0.0, 2e7));
+    println!("{with:?}\n{without:?}");
+    assert_eq!(ended, Status::Solved);
+    assert!(with.time < without.time - 0.01 && with.deployed > 1.1 * without.deployed);
+    // With little energy the dearer joules stay where they are.
+    let ((with, ended), (without, _)) = (best(20.0, 5e5), best(0.0, 5e5));
+    println!("{with:?}, {ended}\n{without:?}");
+    assert_eq!(ended, Status::Solved);
+    assert!((with.time - without.time).abs() < 1e-3);
 }
 
 /// The published swarm searches the front as it does single lines: through every cross-section, cold, without gradients, with the

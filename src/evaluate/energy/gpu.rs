@@ -38,6 +38,10 @@ pub struct EnergyAccount {
     pub exhaust_gain: f32,
     /// Energy that the wheels lack for each joule of the MGU-H.
     pub exhaust_cost: f32,
+    /// Energy out of the store for each joule at the wheels by the MGU-H as a motor, beyond the MGU-K's.
+    pub assist_extra: f32,
+    /// Its force over mass for each joule out of the store, over the MGU-K's.
+    pub assist_share: f32,
     /// Speed squared from which the MGU-H generates, m^2/s^2.
     pub exhaust_from: f32,
     /// Acceleration up to which it does, m/s^2.
@@ -149,6 +153,8 @@ impl DeviceKernel<HybridProblem> for EnergyDevice {
             store_room: table.store_room,
             exhaust_gain: table.exhaust_gain,
             exhaust_cost: table.exhaust_cost,
+            assist_extra: table.assist_extra,
+            assist_share: table.assist_share,
             exhaust_from: table.exhaust_from,
             exhaust_to_ax: table.exhaust_to_ax,
             rows_per_speed_squared: table.rows_per_speed_squared,

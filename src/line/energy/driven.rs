@@ -4,6 +4,7 @@ use super::EnergyCar;
 use super::figures::{EnergyLap, SegmentEnergy};
 use super::kernel::{Along, Car, State};
 use super::plan::{EnergyPlan, Gates, Mode};
+use crate::line::kernel::look_up;
 use crate::scalar::Lookup;
 
 /// Where the motor works on a closed lap, by station: the share of its greatest force from each station to the next.
@@ -77,13 +78,27 @@ pub struct DrivenLapEnergy {
 }
 
 impl EnergyCar {
-    /// The greatest forces of engine, motor and generator over the mass (m/s^2) at a speed (m/s), at the wheels.
-    pub fn greatest_mps2(&self, speed_mps: f64) -> [f64; 3] {
+    /// The greatest forces of engine, motor, generator and of the MGU-H as a motor over the mass (m/s^2) at a speed (m/s), at the
+    /// wheels.
+    pub fn greatest_mps2(&self, speed_mps: f64) -> [f64; 4] {
         let table = &self.table;
-        let (place, beyond) =
-            (speed_mps * speed_mps * table.rows_per_speed_squared).place(table.forces.len() / 8, 8);
+        let square = speed_mps * speed_mps;
+        let (place, beyond) = (square * table.rows_per_speed_squared).place(table.forces.len() / 8, 8);
         let row = f64::pick_row(&table.forces, place);
-        std::array::from_fn(|column: usize| row[column] + beyond * row[4 + column])
+        let [engine, motor, generator] =
+            std::array::from_fn(|column: usize| row[column] + beyond * row[4 + column]);
+        let assist = if table.assists && square < table.exhaust_from {
+            table.rotating * look_up(&table.boosts, 8, place, beyond, 3)
+        } else {
+            0.0
+        };
+        [engine, motor, generator, assist]
+    }
+
+    /// The greatest force of both motors over the mass (m/s^2) at a speed (m/s), at the wheels.
+    pub fn greatest_motors_mps2(&self, speed_mps: f64) -> f64 {
+        let [_, motor, _, assist] = self.greatest_mps2(speed_mps);
+        motor + assist
     }
 }
 
@@ -125,11 +140,14 @@ pub fn driven_energy(car: &EnergyCar, plan: &MotorPlan, moments: &[DrivenMoment]
         let front_brakes = (-moment.wheels_w[0] * per_mass).max(0.0);
         let [demand, braking] = [force, -force].map(|f| f.max(0.0));
         let shed = (braking - front_brakes).max(0.0);
-        let [engine_most, motor_most, generator_most] = car.greatest_mps2(v);
-        let left = kernel.left(&state);
-        let motor = (motor_most * plan.at(moment.station_m))
-            .min(demand)
-            .min(kernel.reach(left, 1.0 / length));
+        let [engine_most, motor_most, generator_most, assist_most] = car.greatest_mps2(v);
+        let share = plan.at(moment.station_m);
+        let reach = kernel.reach(kernel.left(&state), 1.0 / length);
+        let wanted = ((motor_most + assist_most) * share).min(demand);
+        let own = wanted.min(motor_most).min(reach);
+        let assist = (wanted - motor_most)
+            .max(0.0)
+            .min((reach - own) * table.assist_share);
         let along = Along {
             ends: [moment.speed_mps, next].map(|v| v * v),
             mean: v * v,
@@ -141,7 +159,7 @@ pub fn driven_energy(car: &EnergyCar, plan: &MotorPlan, moments: &[DrivenMoment]
         let mut segment = kernel.accounts(
             &mut state,
             &along,
-            [demand, shed, motor],
+            [demand, shed, own + assist, assist],
             [engine_most, generator_most],
             space,
         );

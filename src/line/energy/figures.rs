@@ -76,8 +76,10 @@ pub struct SegmentEnergy<R> {
     pub time: R,
     /// Force over mass at the wheels by the engine (m/s^2),
     pub engine: R,
-    /// by the motor,
+    /// by the motor, with what the MGU-H adds as one,
     pub motor: R,
+    /// which is this,
+    pub assist: R,
     /// by the generator,
     pub generator: R,
     /// and by the hydraulic brakes.

@@ -9,7 +9,8 @@
 //!
 //! The MGU-H is a machine on the turbocharger's shaft: what it generates costs power at the crank. At part load the engine burns
 //! for it by its map. At full load the engine cannot give more, and the car is slower for it. Where the motor replaces the engine,
-//! the speed is kept, and the MGU-H takes only what the engine has to spare.
+//! the speed is kept, and the MGU-H takes only what the engine has to spare. Below the speed from which it generates it may drive the
+//! compressor where the motor works beside the engine: the engine then gives more, and the store pays for it, at a price of its own.
 //!
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
@@ -64,11 +65,13 @@ pub(super) struct Along<R> {
 struct Step<R> {
     /// Speed squared at the end.
     end: R,
-    /// What the motor adds to the acceleration (m/s^2).
+    /// What the motor, and the MGU-H as one, add to the acceleration (m/s^2).
     motor: R,
-    /// The part of it (m/s^2) that gates and zone allow,
+    /// The part of the MGU-H (m/s^2).
+    assist: R,
+    /// What gates and zone allow the MGU-K (m/s^2),
     wanted: R,
-    /// and the part of it for which the store has energy.
+    /// and that for which the store has energy.
     boost: R,
     /// What the store took yet (J): with room in it the MGU-H lowered the engine's part.
     space: R,
@@ -171,10 +174,23 @@ impl<R: Lookup> Car<'_, R> {
         let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 8);
         let [motor, room, exhaust] =
             [0, 1, 2].map(|column| look_up(&self.table.boosts, 8, place, beyond, column));
-        let boost = (motor * self.strategy[5]).min(room);
+        let greatest = (motor * self.strategy[5]).min(room);
         let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
-        let wanted = gated(open, boost * zone_share(&self.plan.zones[here], self.strategy));
-        let boost = wanted.min(self.boost(left, inverse));
+        let share = zone_share(&self.plan.zones[here], self.strategy);
+        let reach = self.boost(left, inverse);
+        let gain = if self.table.assists {
+            let slow = from.less_than(R::load(self.table.exhaust_from));
+            let gain = look_up(&self.table.boosts, 8, place, beyond, 3);
+            gated(slow, gain.min(room - greatest))
+        } else {
+            zero
+        };
+        // The MGU-K first, whose joules are cheaper.
+        let both_wanted = gated(open, (greatest + gain) * share);
+        let wanted = both_wanted.min(greatest);
+        let own = wanted.min(reach);
+        let assist = (both_wanted - wanted).min((reach - own) * R::load(self.table.assist_share));
+        let boost = own + assist;
         let spins = self.spins(from, traction.min(drive + boost) - drag) & R::lit(LEAST_J).less_than(space);
         let exhaust = gated(spins, exhaust);
 
@@ -189,13 +205,15 @@ impl<R: Lookup> Car<'_, R> {
         let motor = R::lit(0.5) * ((both - engine) + (later_both - traction.min(drive)));
         let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(zero);
         let end = reached.min(most);
-        // Where less force is needed than both can give, the motor is reduced first.
+        // Where less force is needed than both can give, the motor is reduced first, and of the motors the dearer one.
         let spare = R::lit(0.5) * (reached - end) * inverse;
+        let motor = (motor - spare).max(zero);
         Step {
             end,
-            motor: (motor - spare).max(zero),
+            motor,
+            assist: assist.min((motor - own).max(zero)),
             wanted,
-            boost,
+            boost: own,
             space,
         }
     }
@@ -215,7 +233,7 @@ impl<R: Lookup> Car<'_, R> {
         most: R,
         store: [R; 2],
     ) -> Step<R> {
-        if let Some([end, motor, wanted, boost, space]) = first {
+        if let (Some([end, motor, wanted, boost, space]), false) = (first, self.table.assists) {
             let now = wanted.min(self.boost(store[0], R::lit(1.0) / length));
             let least = R::lit(LEAST_J);
             let (had, has) = (least.less_than(space), least.less_than(store[1]));
@@ -229,6 +247,7 @@ impl<R: Lookup> Car<'_, R> {
                 return Step {
                     end,
                     motor,
+                    assist: R::lit(0.0),
                     wanted,
                     boost,
                     space,
@@ -261,7 +280,8 @@ impl<R: Lookup> Car<'_, R> {
         let step = self.additional(here, from, length, bends, most, [self.left(state), space]);
         let joules = R::load(table.mass) * length;
         let rotating = R::load(table.rotating);
-        let deployed = joules * (rotating * step.motor) * R::load(table.deploy_cost);
+        let deployed = joules * (rotating * step.motor) * R::load(table.deploy_cost)
+            + joules * (rotating * step.assist) * R::load(table.assist_extra);
         state.speed_squared = step.end;
         state.deployed = state.deployed + deployed;
         state.change = state.change - deployed;
@@ -308,6 +328,7 @@ impl<R: Lookup> Car<'_, R> {
             Mode::Offset => Step {
                 end: self.engine_only(here, from, length, bends, most),
                 motor: zero,
+                assist: zero,
                 wanted: zero,
                 boost: zero,
                 space,
@@ -331,14 +352,17 @@ impl<R: Lookup> Car<'_, R> {
         let force = open.max(zero) + shut.min(zero);
         let demand = force.max(zero);
         let shed = (-force).max(zero);
-        let motor = match self.plan.mode {
-            Mode::Additional => (rotating * step.motor).min(demand),
+        let [motor, assist] = match self.plan.mode {
+            Mode::Additional => {
+                let motor = (rotating * step.motor).min(demand);
+                let unneeded = rotating * step.motor - motor;
+                [motor, (rotating * step.assist - unneeded).max(zero)]
+            }
             Mode::Offset => {
                 let open = self.open(bends[0], from) & self.strategy[2].less_than(ax);
                 let share = zone_share(&self.plan.zones[here], self.strategy);
-                gated(open, motor_most * self.strategy[5] * share)
-                    .min(demand)
-                    .min(self.reach(left, inverse))
+                let motor = gated(open, motor_most * self.strategy[5] * share);
+                [motor.min(demand).min(self.reach(left, inverse)), zero]
             }
         };
         let end_root = end.sqrt();
@@ -355,19 +379,19 @@ impl<R: Lookup> Car<'_, R> {
         let most = [greatest, generator_most * self.strategy[5]];
         SegmentEnergy {
             lost,
-            ..self.accounts(state, &along, [demand, shed, motor], most, space)
+            ..self.accounts(state, &along, [demand, shed, motor, assist], most, space)
         }
     }
 
     /// The accounts of a way whose forces over the mass (m/s^2) at the wheels are known: what drives the car, what holds it back and
-    /// the generator may take, and the motor's part of the first. With them stand the most that engine and generator do there, and
-    /// what the store takes yet (J). The shader, which drives no car, has it as the end of `segment_energy`.
+    /// the generator may take, the motors' part of the first, and the MGU-H's part of that. With them stand the most that engine and
+    /// generator do there, and what the store takes yet (J). The shader, which drives no car, has it as the end of `segment_energy`.
     #[inline(always)]
     pub(super) fn accounts(
         &self,
         state: &mut State<R>,
         along: &Along<R>,
-        [demand, shed, motor]: [R; 3],
+        [demand, shed, motor, assist]: [R; 4],
         [greatest, generator_most]: [R; 2],
         space: R,
     ) -> SegmentEnergy<R> {
@@ -380,7 +404,8 @@ impl<R: Lookup> Car<'_, R> {
         let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
         let room = unharvested * R::load(table.force_per_harvested) * inverse;
         let generator = shed.min(generator_most).min(room.max(zero));
-        let deployed = joules * motor * R::load(table.deploy_cost);
+        let deployed =
+            joules * motor * R::load(table.deploy_cost) + joules * assist * R::load(table.assist_extra);
         let harvested_k = joules * generator * R::load(table.harvest_gain);
 
         let rows = table.flows.len() / 8;
@@ -394,7 +419,8 @@ impl<R: Lookup> Car<'_, R> {
         let spare = joules * (greatest - engine).max(zero) / cost.max(R::lit(LEAST_COST));
         let driving = (engine / greatest.max(R::lit(1e-3))).min(one);
         let exhaust = R::load(table.exhaust_gain) * (flow_at(flows, driving) * time);
-        let harvested_h = gated(self.spins(along.mean, along.ax), exhaust.min(spare).min(space));
+        let spins = self.spins(along.mean, along.ax) & !zero.less_than(assist);
+        let harvested_h = gated(spins, exhaust.min(spare).min(space));
         let crank = engine + cost * harvested_h / joules;
         let load = (crank / greatest.max(R::lit(1e-3))).min(one);
 
@@ -408,6 +434,7 @@ impl<R: Lookup> Car<'_, R> {
             time,
             engine,
             motor,
+            assist,
             generator,
             hydraulic: shed - generator,
             lost: zero,
@@ -420,16 +447,16 @@ impl<R: Lookup> Car<'_, R> {
     }
 }
 
-/// A segment of one lap by itself: the speed squared reached with the motor at a share of its force beside the engine,
-/// without a limit at the end, and the force of the motor over the mass (m/s^2).
-pub fn motor_step(
+/// A segment of one lap by itself: the speed squared reached with the motors at a share of their force beside the engine, without a
+/// limit at the end, their force over the mass (m/s^2), and the MGU-H's part of it.
+pub fn motors_step(
     envelope: &EnvelopeTable<f64>,
     table: &EnergyTable<f64>,
     from: f64,
     length: f64,
     (bends, drs): ([f64; 2], bool),
     share: f64,
-) -> [f64; 2] {
+) -> [f64; 3] {
     let car = Car {
         envelope,
         table,
@@ -446,7 +473,11 @@ pub fn motor_step(
         drs: &[drs],
     };
     let step = car.additional(0, from, length, bends, f64::INFINITY, [f64::INFINITY; 2]);
-    [step.end, table.rotating * step.motor]
+    [
+        step.end,
+        table.rotating * step.motor,
+        table.rotating * step.assist,
+    ]
 }
 
 /// Fills `course.speed_squared` with the greatest speeds squared from which all that follows can be braked for.

@@ -3,6 +3,7 @@
 use super::super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable};
 use crate::error::{Error, Result};
 use crate::scalar::Real;
+use crate::vehicle::hybrid::MguH;
 use crate::vehicle::powertrain::EngineMap;
 use crate::vehicle::{Car, Envelope, EnvelopeRow, Hybrid, Powertrain, Traction};
 
@@ -34,6 +35,12 @@ pub struct EnergyTable<S> {
     pub exhaust_gain: S,
     /// Energy that the wheels lack for each joule of the MGU-H, while the engine gives no more.
     pub exhaust_cost: S,
+    /// Whether the MGU-H drives the compressor at lower speeds.
+    pub assists: bool,
+    /// Energy out of the store for each joule at the wheels by that, beyond the MGU-K's,
+    pub assist_extra: S,
+    /// and the force over mass for each joule out of the store, over the MGU-K's.
+    pub assist_share: S,
     /// Speed squared from which the MGU-H generates (m^2/s^2).
     pub exhaust_from: S,
     /// Greatest acceleration at which the MGU-H generates (m/s^2).
@@ -43,7 +50,7 @@ pub struct EnergyTable<S> {
     /// Fuel flow (kg/s) at a load of 0, 1/3, 2/3 and 1, then the rises.
     pub flows: Vec<S>,
     /// What the motor adds to the acceleration (m/s^2), the room that engine and tyres leave for it, what the MGU-H takes from it at
-    /// full load, and zero; then their rises.
+    /// full load as a generator and adds to it as a motor; then their rises.
     pub boosts: Vec<S>,
 }
 
@@ -93,6 +100,7 @@ impl EnergyTable<f64> {
         let rows = table.rows.len() / ENVELOPE_WIDTH;
         let top_ratio = powertrain.gear_ratios[powertrain.gear_ratios.len() - 1] * powertrain.final_drive;
         let last: EnvelopeRow = envelope.rows()[envelope.rows().len() - 1];
+        let h = hybrid.mgu_h;
         let (mut forces, mut flows, mut boosts) = (Vec::new(), Vec::new(), Vec::new());
         for knot in 0..=rows {
             let v = (table.top * knot as f64 / rows as f64).sqrt();
@@ -122,11 +130,11 @@ impl EnergyTable<f64> {
                 motor / powertrain.rotating_mass_factor,
                 (traction.at(v) - driven).clamp(0.0, ENDLESS_MPS2),
                 flows[knot][3],
-                0.0,
+                h.map_or(0.0, |h| h.motor_gain_w) * powertrain.efficiency
+                    / (mass * slow * powertrain.rotating_mass_factor),
             ]);
         }
         let greatest_flow = flows.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
-        let h = hybrid.mgu_h;
         let exhaust_gain = h.map_or(0.0, |h| h.generated_w(1.0) / greatest_flow);
         let exhaust_cost = h.map_or(0.0, |h| {
             powertrain.efficiency * h.generator_cost_w / h.generator_w
@@ -137,6 +145,10 @@ impl EnergyTable<f64> {
             row[2] *= per_flow;
         }
         let deploy_cost = 1.0 / (k.motor_efficiency * powertrain.efficiency);
+        let motor = h.filter(MguH::motors);
+        let assist_cost = motor.map_or(deploy_cost, |h| {
+            h.motor_w / (h.motor_gain_w * powertrain.efficiency)
+        });
         let harvest_gain = k.generator_efficiency * powertrain.efficiency;
         Ok(Self {
             mass,
@@ -150,6 +162,9 @@ impl EnergyTable<f64> {
             store_room: hybrid.store.room_j(),
             exhaust_gain,
             exhaust_cost,
+            assists: motor.is_some(),
+            assist_extra: assist_cost - deploy_cost,
+            assist_share: deploy_cost / assist_cost,
             exhaust_from: h.map_or(1e9, |h| h.from_speed_mps.powi(2)),
             exhaust_to_ax: h.map_or(0.0, |h| h.to_ax_mps2),
             forces: with_rises(&forces),
@@ -173,6 +188,9 @@ impl EnergyTable<f64> {
             store_room: R::store(self.store_room),
             exhaust_gain: R::store(self.exhaust_gain),
             exhaust_cost: R::store(self.exhaust_cost),
+            assists: self.assists,
+            assist_extra: R::store(self.assist_extra),
+            assist_share: R::store(self.assist_share),
             exhaust_from: R::store(self.exhaust_from),
             exhaust_to_ax: R::store(self.exhaust_to_ax),
             forces: all(&self.forces),

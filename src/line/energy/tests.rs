@@ -238,7 +238,7 @@ fn the_turbocharger_s_generator_takes_its_power_from_the_crank() {
     let (with, without) = (&car().with_hybrid(hybrid).unwrap(), car_without_h());
     let (v, h) = (66.0f64, 5.0);
     let reached = |car: &EnergyCar| {
-        kernel::motor_step(&car.envelope_table, &car.table, v * v, h, ([0.0; 2], false), 0.0)[0]
+        kernel::motors_step(&car.envelope_table, &car.table, v * v, h, ([0.0; 2], false), 0.0)[0]
     };
     // The flow at this speed is not the greatest, and so is not the power: its share is the map's.
     let powertrain = with.car.powertrain.as_ref().unwrap();
@@ -295,6 +295,97 @@ fn the_turbocharger_s_generator_takes_its_power_from_the_crank() {
                 }
                 Mode::Additional => assert!(lap.harvested_h > 0.0 && lap.time > plain.time),
             }
+        }
+    }
+}
+
+/// The car whose MGU-H takes 60 kW out of the store below 55 m/s, for 20 kW at the crank: the published machine.
+fn car_with_assist() -> EnergyCar {
+    let mut hybrid = car().hybrid.clone();
+    let h = hybrid.mgu_h.as_mut().unwrap();
+    (h.motor_w, h.motor_gain_w, h.from_speed_mps) = (60e3, 20e3, 55.0);
+    car().with_hybrid(hybrid).unwrap()
+}
+
+/// On a straight at 50 m/s engine and motor are joined by 20 kW at the crank, less the gearbox's losses. At 60 m/s the machine does not
+/// drive, nor where the tyres leave no room, and of less than both give the MGU-K has the first part.
+#[test]
+fn the_turbocharger_s_motor_gives_what_its_file_says_at_the_price_that_it_says() {
+    let (with, without) = (&car_with_assist(), car_without_h());
+    let h = 5.0;
+    let step = |car: &EnergyCar, v: f64, share: f64| {
+        kernel::motors_step(
+            &car.envelope_table,
+            &car.table,
+            v * v,
+            h,
+            ([0.0; 2], false),
+            share,
+        )
+    };
+    let rotating = with.table.rotating;
+    // The table's steps over the speed, as in the test of the tables.
+    let near = |found: f64, wanted: f64| (found - wanted).abs() <= 2e-2 * wanted;
+    let by_hand = 20e3 * 0.95 / (50.0 * 1245.0);
+    let ([end, motors, assist], [plain_end, motor, none]) =
+        (step(with, 50.0, 1.0), step(&without, 50.0, 1.0));
+    assert!(near(assist, by_hand) && none == 0.0, "{assist} and {by_hand}");
+    assert!((motors - motor - assist).abs() < 1e-9);
+    assert!(near((end - plain_end) / (2.0 * h), by_hand / rotating));
+    let [_, half, assist] = step(with, 50.0, 0.5);
+    assert!((half - 0.5 * motors).abs() < 1e-9 && assist == 0.0);
+    let [_, most, assist] = step(with, 50.0, 0.95);
+    assert!((most - assist - motor).abs() < 1e-9 && assist > 0.0);
+    assert_eq!(step(with, 60.0, 1.0), step(&without, 60.0, 1.0));
+    // At 20 m/s the tyres hardly leave the motor room.
+    assert_eq!(step(with, 20.0, 1.0), step(&without, 20.0, 1.0));
+}
+
+/// Whatever the budget, the books of laps with it balance joule by joule, it works below its speed and at full load only, and
+/// with energy enough the lap is faster than by the MGU-K alone.
+#[test]
+fn laps_with_the_turbocharger_s_motor_balance() {
+    let lap = |car: EnergyCar, energy_mj: f64| {
+        let gates = Gates {
+            energy_mj,
+            ..Gates::OPEN
+        };
+        let whole = problem_of(car.clone(), Mode::Additional);
+        let strategy = Strategy::fixed(gates, 4);
+        let (line, energy) = (whole.line().clone(), whole.energy().clone());
+        HybridProblem::new(line, car, energy, strategy, &[HybridObjective::LapTime], 10.0)
+            .unwrap()
+            .lap(&[])
+    };
+    for energy_mj in [0.0, 0.3, 1.0, 5.0] {
+        let (found, segments, course) = lap(car_with_assist(), energy_mj);
+        assert!(found.deployed <= 1e6 * energy_mj + 1e-6, "{energy_mj}");
+        let mut paid = 0.0;
+        for (i, s) in segments.iter().enumerate() {
+            let joules = 1245.0 * course.length[i];
+            let crank = joules / 0.95;
+            paid += crank * (s.motor - s.assist) + 3.0 * crank * s.assist;
+            assert!(s.assist >= 0.0 && s.assist <= s.motor, "{i}");
+            if s.assist > 1e-6 {
+                assert!(s.start < 55.0f64.powi(2) && s.harvested_h == 0.0, "{i}");
+            }
+        }
+        assert!(
+            (paid - found.deployed).abs() < 1e-6 * paid.max(1.0),
+            "{energy_mj}: {paid}"
+        );
+        let change = found.harvested_k + found.harvested_h - found.deployed;
+        assert!((found.change - change).abs() < 1e-6, "{energy_mj}");
+        let assisted: f64 = segments.iter().map(|s| s.assist).sum();
+        assert_eq!(assisted > 0.0, energy_mj > 0.0);
+        if energy_mj == 5.0 {
+            let alone = lap(car_without_h(), energy_mj).0;
+            assert!(
+                found.time < alone.time - 1e-3,
+                "{} and {}",
+                found.time,
+                alone.time
+            );
         }
     }
 }
@@ -376,7 +467,7 @@ fn the_accounts_of_a_driven_lap_by_hand() {
         length_m: 400.0,
     };
     let speed = 50.0;
-    let [engine_most, motor_most, generator_most] = car.greatest_mps2(speed);
+    let [engine_most, motor_most, generator_most, _] = car.greatest_mps2(speed);
     let moment = |station_m: f64, wheels_w: [f64; 2]| DrivenMoment {
         time_s: 0.1,
         station_m,
@@ -434,6 +525,49 @@ fn the_accounts_of_a_driven_lap_by_hand() {
     // At one speed the car is moved against drag and rolling resistance alone.
     assert!((driven.moving_j - 5.0 * joules * (1000.0 / mass + rolling)).abs() < 1e-6);
     assert!((lap.time - 0.5).abs() < 1e-12 && (lap.motor_time - 0.3).abs() < 1e-12);
+}
+
+/// In a driven lap the MGU-H drives by the same plan, after the MGU-K, at its own price.
+#[test]
+fn the_accounts_of_a_driven_lap_with_the_turbocharger_s_motor() {
+    let car = car_with_assist();
+    let (mass, speed) = (car.table.mass, 50.0);
+    let [_, own, _, assist] = car.greatest_mps2(speed);
+    assert!((assist / (20e3 * 0.95 / (mass * speed)) - 1.0).abs() < 2e-2);
+    assert_eq!(car.greatest_mps2(60.0)[3], 0.0);
+    let plan = MotorPlan {
+        station_m: vec![0.0],
+        share: vec![0.95],
+        length_m: 400.0,
+    };
+    let rolling = car.car.rolling_mps2();
+    let moment = |force: f64| DrivenMoment {
+        time_s: 0.1,
+        station_m: 10.0,
+        speed_mps: speed,
+        ax_mps2: 0.0,
+        wheels_w: [0.0, (force - rolling) * mass * speed],
+        drag_n: 1000.0,
+    };
+    // More than both give by the plan, then half of what the MGU-H gives beyond the MGU-K, then less than the MGU-K gives.
+    let moments = [
+        moment(own + assist),
+        moment(own + 0.25 * assist),
+        moment(0.5 * own),
+    ];
+    let driven = driven_energy(&car, &plan, &moments);
+    let joules = mass * speed * 0.1;
+    let planned = 0.95 * (own + assist) - own;
+    assert!(planned > 0.25 * assist);
+    for (s, [k, h]) in driven
+        .segments
+        .iter()
+        .zip([[own, planned], [own, 0.25 * assist], [0.5 * own, 0.0]])
+    {
+        assert!((s.assist - h).abs() < 1e-9 && (s.motor - s.assist - k).abs() < 1e-9);
+        let paid = joules / 0.95 * (k + 3.0 * h);
+        assert!((s.deployed - paid).abs() < 1e-6, "{} and {paid}", s.deployed);
+    }
 }
 
 /// A plan repeats from lap to lap, and between two places it has the mean of what is there.

@@ -66,7 +66,7 @@ impl Motor {
         let share = rows.iter().enumerate().map(|(i, [_, v, _, motor_kw, _])| {
             let mean = 0.5 * (v + after(i));
             let force_mps2 = 1e3 * motor_kw / (energy.table.mass * mean);
-            let [_, most, _] = energy.greatest_mps2((0.5 * (v * v + after(i).powi(2))).sqrt());
+            let most = energy.greatest_motors_mps2((0.5 * (v * v + after(i).powi(2))).sqrt());
             (force_mps2 / most).clamp(0.0, 1.0)
         });
         let [station, v, time, ..] = rows[rows.len() - 1];
@@ -132,7 +132,7 @@ impl Motor {
         let lap = ReportedLap::of("quasi-steady state", &problem, &[]);
         let car = problem.car().clone();
         let share = lap.segments.iter().map(|s| {
-            let [_, most, _] = car.greatest_mps2((0.5 * (s.start + s.end)).sqrt());
+            let most = car.greatest_motors_mps2((0.5 * (s.start + s.end)).sqrt());
             (s.motor / most).min(1.0)
         });
         let plan = MotorPlan {
@@ -177,7 +177,7 @@ impl Ideal {
 
     /// Torque of the motor at the driven wheels (N m) at a station (m) and a speed (m/s).
     pub(super) fn torque_nm(&self, station_m: f64, speed_mps: f64) -> f64 {
-        let [_, most, _] = self.car.greatest_mps2(speed_mps);
+        let most = self.car.greatest_motors_mps2(speed_mps);
         self.plan.at(station_m) * most * self.car.table.mass * self.car.car.chassis.radius_rear
     }
 

@@ -56,7 +56,8 @@ impl MguK {
     }
 }
 
-/// The motor-generator on the turbocharger, as a generator.
+/// The motor-generator on the turbocharger. It generates on straights; below the speed from which it does, it may drive the compressor
+/// as a motor, and the engine gives more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MguH {
     /// Greatest power out (W).
@@ -67,6 +68,10 @@ pub struct MguH {
     pub from_speed_mps: f64,
     /// and greatest acceleration of the car at which it does (m/s^2).
     pub to_ax_mps2: f64,
+    /// Power out of the store while it drives the compressor (W), zero for a machine that only generates,
+    pub motor_w: f64,
+    /// and what the engine gives more at the crank for it (W): `P_add` of the thesis's (4.8), with all of its power on the compressor.
+    pub motor_gain_w: f64,
 }
 
 impl MguH {
@@ -74,6 +79,11 @@ impl MguH {
     /// (4.9) with a closed waste-gate.
     pub fn generated_w(&self, flow_share: f64) -> f64 {
         self.generator_w * flow_share
+    }
+
+    /// Whether it drives the compressor.
+    pub fn motors(&self) -> bool {
+        self.motor_w > 0.0
     }
 }
 

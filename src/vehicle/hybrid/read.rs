@@ -15,12 +15,7 @@ impl Hybrid {
         k.finish()?;
         let mgu_h = match table.table("mgu_h")? {
             Some(h) => {
-                let mgu_h = MguH {
-                    generator_w: 1e3 * h.required_number("generator_kw", 0.1, 1000.0, "kW")?,
-                    generator_cost_w: 1e3 * h.number("generator_cost_kw", 0.0, 1000.0, "kW")?.unwrap_or(0.0),
-                    from_speed_mps: h.number("from_speed_mps", 0.0, 200.0, "m/s")?.unwrap_or(0.0),
-                    to_ax_mps2: h.number("to_ax_mps2", 0.0, 100.0, "m/s^2")?.unwrap_or(100.0),
-                };
+                let mgu_h = read_mgu_h(&h)?;
                 h.finish()?;
                 Some(mgu_h)
             }
@@ -74,6 +69,13 @@ impl Hybrid {
                 h.from_speed_mps,
                 h.to_ax_mps2
             );
+            if h.motors() {
+                text += &format!(
+                    "motor_kw = {:?}\nmotor_gain_kw = {:?}\n",
+                    h.motor_w / 1e3,
+                    h.motor_gain_w / 1e3
+                );
+            }
         }
         let rules = &self.rules;
         if *rules != EnergyRules::default() {
@@ -114,6 +116,31 @@ fn read_mgu_k(table: &Table<'_>) -> Result<MguK> {
         speed_rpm,
         torque_nm,
     })
+}
+
+fn read_mgu_h(table: &Table<'_>) -> Result<MguH> {
+    let motor_kw = table.number("motor_kw", 0.1, 1000.0, "kW")?;
+    let gain_kw = table.number("motor_gain_kw", 0.1, 1000.0, "kW")?;
+    let mgu_h = MguH {
+        generator_w: 1e3 * table.required_number("generator_kw", 0.1, 1000.0, "kW")?,
+        generator_cost_w: 1e3
+            * table
+                .number("generator_cost_kw", 0.0, 1000.0, "kW")?
+                .unwrap_or(0.0),
+        from_speed_mps: table.number("from_speed_mps", 0.0, 200.0, "m/s")?.unwrap_or(0.0),
+        to_ax_mps2: table.number("to_ax_mps2", 0.0, 100.0, "m/s^2")?.unwrap_or(100.0),
+        motor_w: 1e3 * motor_kw.unwrap_or(0.0),
+        motor_gain_w: 1e3 * gain_kw.unwrap_or(0.0),
+    };
+    match (motor_kw, gain_kw) {
+        (Some(_), None) => Err(table.refuse("motor_gain_kw", "what the engine gives more for motor_kw (kW)")),
+        (None, Some(_)) => Err(table.refuse("motor_kw", "what motor_gain_kw takes out of the store (kW)")),
+        (Some(_), Some(_)) if mgu_h.from_speed_mps == 0.0 => Err(table.refuse(
+            "from_speed_mps",
+            "a speed above 0 m/s: below it the machine is a motor, from it on a generator",
+        )),
+        _ => Ok(mgu_h),
+    }
 }
 
 fn read_rules(table: &Table<'_>) -> Result<EnergyRules> {

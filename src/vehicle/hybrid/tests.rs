@@ -47,12 +47,15 @@ fn the_turbocharger_generates_by_its_flow() {
 #[test]
 fn files_are_written_and_read_back() {
     let folder = tempfile::tempdir().unwrap();
-    let car = Car::load("gt_hybrid").unwrap();
-    car.write(folder.path(), "own").unwrap();
-    assert_eq!(
-        Car::load(folder.path().join("own.toml").to_str().unwrap()).unwrap(),
-        car
-    );
+    let mut car = Car::load("gt_hybrid").unwrap();
+    let written = |car: &Car| {
+        car.write(folder.path(), "own").unwrap();
+        Car::load(folder.path().join("own.toml").to_str().unwrap()).unwrap()
+    };
+    assert_eq!(written(&car), car);
+    let h = car.hybrid.as_mut().unwrap().mgu_h.as_mut().unwrap();
+    (h.motor_w, h.motor_gain_w) = (60e3, 20e3);
+    assert_eq!(written(&car), car);
 }
 
 #[test]
@@ -76,7 +79,17 @@ fn mistakes_are_named() {
         (
             "generator_kw = 40.0",
             "generator_kw = 40.0\nmotor_gain_kw = 80.0",
+            "hybrid.mgu_h.motor_kw",
+        ),
+        (
+            "generator_kw = 40.0",
+            "generator_kw = 40.0\nmotor_kw = 60.0",
             "hybrid.mgu_h.motor_gain_kw",
+        ),
+        (
+            "from_speed_mps = 65.0",
+            "motor_kw = 60.0\nmotor_gain_kw = 20.0",
+            "hybrid.mgu_h.from_speed_mps",
         ),
         (
             "capacity_mj = 5.3",
