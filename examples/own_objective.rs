@@ -9,7 +9,7 @@ use lapswarm::evaluate::line::{LineObjective, LineProblem, open_line_evaluator};
 use lapswarm::evaluate::{BackendChoice, BackendInfo, Evaluation, Evaluator, Objective, Problem};
 use lapswarm::line::Parametrisation;
 use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser, run};
-use lapswarm::track::{Spacing, Track};
+use lapswarm::track::Track;
 use std::ops::ControlFlow;
 
 /// A line's length, and the greatest share of half the road that it strays from the middle.
@@ -45,7 +45,7 @@ impl Evaluator for WithEdges<'_> {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let sections = Track::load("ellipse:400:250:12")?.cross_sections(&Spacing::equal(120), true)?;
+    let sections = Track::load("ellipse:400:250:12")?.cross_sections(120, true)?;
     let way = Parametrisation::control_points(8);
     let line = LineProblem::new(sections, way, &[LineObjective::Length], None, 0.0)?;
     let length = open_line_evaluator(&line, BackendChoice::Auto, None)?;

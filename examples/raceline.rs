@@ -10,13 +10,13 @@ use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::optimum::{Bounds, LineMap, shortest};
 use lapswarm::study::raceline::{LineSearch, LineSearchSettings, search_line};
-use lapswarm::track::{Spacing, Track};
+use lapswarm::track::Track;
 use std::ops::ControlFlow;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let track = Track::load("ellipse:400:250:12")?;
     // The middle of a car of 2 m may use what its sides leave of the road.
-    let sections = track.cross_sections(&Spacing::equal(120), true)?.narrowed(2.0)?;
+    let sections = track.cross_sections(120, true)?.narrowed(2.0)?;
     let exact = shortest(
         &LineMap::at_every_cross_section(&sections),
         &Bounds::road(sections.len()),

@@ -61,9 +61,9 @@
 //! use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, SimdLineEvaluator};
 //! use lapswarm::evaluate::simd::InstructionSet;
 //! use lapswarm::line::Parametrisation;
-//! use lapswarm::track::{Spacing, Track};
+//! use lapswarm::track::Track;
 //!
-//! let cross_sections = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(361), true)?;
+//! let cross_sections = Track::load("circle:590:600")?.cross_sections(361, true)?;
 //! let problem = LineProblem::new(cross_sections, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
 //! let lines = [vec![0.0; 361], vec![1.0; 361]].concat();
 //! let reference = CpuLineEvaluator::new(&problem).evaluate(&lines)?;
@@ -80,7 +80,7 @@
 //! use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 //! use lapswarm::evaluate::{BackendInfo, Evaluation, Evaluator, Problem};
 //! use lapswarm::line::Parametrisation;
-//! use lapswarm::track::{Spacing, Track};
+//! use lapswarm::track::Track;
 //!
 //! struct Charged<E>(E);
 //!
@@ -101,7 +101,7 @@
 //!     }
 //! }
 //!
-//! let cross_sections = Track::load("circle:590:600")?.cross_sections(&Spacing::equal(100), true)?;
+//! let cross_sections = Track::load("circle:590:600")?.cross_sections(100, true)?;
 //! let problem = LineProblem::new(cross_sections, Parametrisation::sections(), &[LineObjective::Length], None, 0.0)?;
 //! let mut charged = Charged(CpuLineEvaluator::new(&problem));
 //! let plain = CpuLineEvaluator::new(&problem).evaluate(&[1.0; 100])?;

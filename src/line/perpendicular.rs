@@ -209,13 +209,13 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Shape, Spacing, Track};
+    use crate::track::{Shape, Track};
 
     /// Square to a line in a ring, cross-sections lie along the radii, and reach from edge to edge.
     #[test]
     fn cross_sections_about_a_circle_are_its_radii() {
         let ring = Shape::parse("circle:90:110").unwrap().unwrap();
-        let road = ring.cross_sections(&Spacing::equal(400)).unwrap();
+        let road = ring.cross_sections(400).unwrap();
         let points = road.points(&vec![0.3; 400]);
         let cross_sections = cross_sections_about(&road, &points, 300).unwrap();
         for i in 0..300 {
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn lines_within_are_on_the_road() {
         let track = Track::load("silverstone_gp").unwrap();
-        let road = track.cross_sections(&Spacing::equal(720), false).unwrap();
+        let road = track.cross_sections(720, false).unwrap();
         let cross_sections = cross_sections_about(&road, &road.points(&road.reference), 1440).unwrap();
         for alpha in [0.0, 0.5, 1.0] {
             let shares = shares_across(&road, &cross_sections.points(&vec![alpha; 1440])).unwrap();
@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn an_open_road_is_refused() {
         let track = Track::load("silverstone_gp").unwrap();
-        let mut road = track.cross_sections(&Spacing::equal(120), false).unwrap();
+        let mut road = track.cross_sections(120, false).unwrap();
         let points = road.points(&road.reference);
         road.closed = false;
         let error = cross_sections_about(&road, &points, 100).unwrap_err().to_string();

@@ -167,7 +167,7 @@ mod tests {
     use super::*;
     use crate::line::FineLine;
     use crate::line::kernel::{acceleration, corner};
-    use crate::track::{Shape, Spacing};
+    use crate::track::Shape;
     use crate::vehicle::Car;
     use crate::vehicle::limits::{SpeedRange, car_envelope};
 
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn the_solvers_open_the_drs_as_the_kernels_do() {
         let shape = Shape::parse("ellipse:300:60:12").unwrap().unwrap();
-        let mut road = shape.cross_sections(&Spacing::equal(400)).unwrap();
+        let mut road = shape.cross_sections(400).unwrap();
         let swept = car_envelope(&Car::bundled().unwrap(), &SpeedRange::USUAL)
             .unwrap()
             .envelope;

@@ -3,11 +3,11 @@
 use super::*;
 use crate::line::Parametrisation;
 use crate::random::Random;
-use crate::track::{CrossSections, Shape, Spacing};
+use crate::track::{CrossSections, Shape};
 
 fn ellipse(cross_sections: usize) -> CrossSections {
     let shape = Shape::parse("ellipse:300:60:12").unwrap().unwrap();
-    shape.cross_sections(&Spacing::equal(cross_sections)).unwrap()
+    shape.cross_sections(cross_sections).unwrap()
 }
 
 /// Grip that grows with speed, constant power, drag.
@@ -282,7 +282,7 @@ fn statuses_are_in_plain_words() {
 #[test]
 fn a_steady_circle_is_driven_at_the_ellipse() {
     let circle = Shape::parse("circle:95:105").unwrap().unwrap();
-    let map = LineMap::at_every_cross_section(&circle.cross_sections(&Spacing::equal(360)).unwrap());
+    let map = LineMap::at_every_cross_section(&circle.cross_sections(360).unwrap());
     let problem = ReferenceProblem {
         envelope: Some(&Racer),
         ..ReferenceProblem::of(&map)

@@ -206,14 +206,14 @@ mod tests {
     use super::super::{Bounds, DescentSettings, LineMap, PointMassEnvelope, ReferenceProblem, fastest};
     use super::*;
     use crate::line::{FineLine, PointMass};
-    use crate::track::{CrossSections, SectionRelief, Shape, Spacing};
+    use crate::track::{CrossSections, SectionRelief, Shape};
     use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
     use std::f64::consts::TAU;
 
     /// An ellipse with hills, 8 m high, and banking of up to eight degrees, as much of both as is asked for.
     fn road(share: f64) -> CrossSections {
         let shape = Shape::parse("ellipse:260:150:12").unwrap().unwrap();
-        let level = shape.cross_sections(&Spacing::equal(150)).unwrap();
+        let level = shape.cross_sections(150).unwrap();
         let angle = |i: usize| TAU * i as f64 / 150.0;
         let relief = SectionRelief {
             foot_m: level.points(&[0.5; 150]),

@@ -10,7 +10,7 @@ use super::circuit::in_a_zone;
 use super::cross_sections::CrossSections;
 use super::crossing::{Stretch, crossings, stretches};
 use super::relief::SectionRelief;
-use super::road::{Road, RoadFrame, Spacing, even_stations, spread};
+use super::road::{Road, RoadFrame, even_stations, spread};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 
@@ -30,21 +30,13 @@ impl Circuit {
     /// # Errors
     /// [`Error::Input`] naming the station where the road overlaps itself or is wider than a bend allows.
     pub fn cross_sections(&self, count: usize) -> Result<CrossSections> {
-        self.cross_sections_spaced(&Spacing::equal(count))
-    }
-
-    /// As [`Circuit::cross_sections`], with a spacing that may be denser in corners.
-    ///
-    /// # Errors
-    /// As [`Circuit::cross_sections`], and for a spacing out of range.
-    pub fn cross_sections_spaced(&self, spacing: &Spacing) -> Result<CrossSections> {
-        cross_sections(self, spacing)
+        cross_sections(self, count)
     }
 }
 
 /// Cross-sections across a road, as [`Circuit::cross_sections_spaced`].
-pub(super) fn cross_sections(road: &dyn Road, spacing: &Spacing) -> Result<CrossSections> {
-    let mut cutter = Cutter::new(road, spread(road, spacing)?)?;
+pub(super) fn cross_sections(road: &dyn Road, count: usize) -> Result<CrossSections> {
+    let mut cutter = Cutter::new(road, spread(road, count)?)?;
     cutter.mend()?;
     cutter.check_edges()?;
     let share = |(frame, &[right, left]): (&RoadFrame, &Stretch)| {

@@ -34,7 +34,6 @@ pub use load::BUNDLED;
 pub use reference::{ReferenceLine, Smoothing};
 pub(crate) use relief::interpolated;
 pub use relief::{Relief, ReliefChange, ReliefFacts, SectionRelief};
-pub use road::Spacing;
 pub use shapes::Shape;
 pub use source::Track;
 pub use spline::Deviation;

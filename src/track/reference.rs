@@ -5,7 +5,7 @@ use super::cross_sections::CrossSections;
 use super::cutting::cross_sections;
 use super::from_curvature::Closure;
 use super::relief::{Given, ReliefChange, SmoothRelief};
-use super::road::{Road, RoadFrame, Spacing, circuit};
+use super::road::{Road, RoadFrame, circuit};
 use super::spline::{Deviation, Spline};
 use super::survey::Survey;
 use crate::{Error, Result};
@@ -261,8 +261,8 @@ impl ReferenceLine {
     /// # Errors
     /// [`Error::Input`] naming the station where the road overlaps itself or is wider than a bend allows, or for a
     /// spacing out of range.
-    pub fn cross_sections(&self, spacing: &Spacing) -> Result<CrossSections> {
-        cross_sections(self, spacing)
+    pub fn cross_sections(&self, count: usize) -> Result<CrossSections> {
+        cross_sections(self, count)
     }
 
     /// A circuit along the line, and the changes that close it. Cross-sections every few metres are made first, so that an
@@ -272,7 +272,7 @@ impl ReferenceLine {
     /// [`Error::Input`] naming the station where the line or its widths cannot be a road's.
     pub fn circuit(&self) -> Result<(Circuit, Closure)> {
         let cross_sections = (self.length_m() / TRIED_EVERY_M).ceil().max(8.0) as usize;
-        self.cross_sections(&Spacing::equal(cross_sections))?;
+        self.cross_sections(cross_sections)?;
         circuit(self)
     }
 

@@ -283,7 +283,7 @@ pub(crate) fn interpolated(knots: &[f64], data: &[f64], closed: bool, at: &[f64]
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Smoothing, Spacing, Survey, SurveyOptions};
+    use super::super::{Smoothing, Survey, SurveyOptions};
     use std::f64::consts::TAU;
     use std::fmt::Write as _;
     use std::path::Path;
@@ -353,10 +353,7 @@ mod tests {
         let level = survey(&circle(",z_m,bank_deg", |_| ",12,0".to_owned(), None)).unwrap();
         let cut = |survey: &Survey| {
             let road = survey.smoothed(&Smoothing::default()).unwrap();
-            (
-                road.circuit().unwrap(),
-                road.cross_sections(&Spacing::equal(60)).unwrap(),
-            )
+            (road.circuit().unwrap(), road.cross_sections(60).unwrap())
         };
         assert_eq!(cut(&plain), cut(&level));
         let flat = SurveyOptions {

@@ -5,7 +5,6 @@ use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::relief::{Relief, ReliefChange};
 use crate::{Error, Place, Result};
 use glam::DVec2;
-use std::f64::consts::PI;
 
 /// Distance between the rows of curvature that a circuit is built from (m), before rounding to whole steps.
 const ROW_M: f64 = 1.0;
@@ -176,112 +175,19 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
     Ok((circuit, closure))
 }
 
-/// How cross-sections are spread along a road.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spacing {
-    /// Number of cross-sections.
-    pub cross_sections: usize,
-    /// Factor by which they are denser in the tightest corners than on straights; 1 for equal steps.
-    pub corner_density: f64,
-}
-
-impl Spacing {
-    /// Equal steps.
-    pub fn equal(cross_sections: usize) -> Self {
-        Self {
-            cross_sections,
-            corner_density: 1.0,
-        }
-    }
-}
-
 /// Fewest and most cross-sections.
 const COUNTS: (usize, usize) = (8, 1_000_000);
-/// Cross-sections stand closer within this distance of a corner (m), so that steps change gradually.
-const APPROACH_M: f64 = 30.0;
-
-/// The stations of cross-sections, ascending from 0; an open road has its last at its end.
-pub(super) fn spread(road: &dyn Road, spacing: &Spacing) -> Result<Vec<f64>> {
-    let Spacing {
-        cross_sections,
-        corner_density,
-    } = *spacing;
-    if !(COUNTS.0..=COUNTS.1).contains(&cross_sections) {
+/// The stations of so many cross-sections at equal steps, ascending from 0; an open road has its last at its end.
+pub(super) fn spread(road: &dyn Road, count: usize) -> Result<Vec<f64>> {
+    if !(COUNTS.0..=COUNTS.1).contains(&count) {
         return Err(Error::input(
             road.source(),
             "number of cross-sections",
-            cross_sections.to_string(),
+            count.to_string(),
             format!("{} to {}", COUNTS.0, COUNTS.1),
         ));
     }
-    if !(1.0..=20.0).contains(&corner_density) {
-        return Err(Error::input(
-            road.source(),
-            "corner density of cross-sections",
-            corner_density.to_string(),
-            "1 (equal steps) to 20",
-        ));
-    }
-    let steps = cross_sections - usize::from(!road.closed());
+    let steps = (count - usize::from(!road.closed())) as f64;
     let length = road.length_m();
-    let even = |i: usize| length * i as f64 / steps as f64;
-    if corner_density == 1.0 {
-        return Ok((0..cross_sections).map(even).collect());
-    }
-    // Cross-sections per metre by station: 1 on straights, corner_density where the curvature is greatest.
-    let samples = even_stations(road, 2.0);
-    let step = length / (samples.len() - usize::from(!road.closed())) as f64;
-    let bends: Vec<f64> = samples
-        .iter()
-        .map(|&s| road.frame(s).curvature_1pm.abs())
-        .collect();
-    let reach = (APPROACH_M / step).ceil() as usize;
-    let mut near = averaged(&bends, reach, road.closed());
-    let most = near.iter().fold(0.0f64, |a, &b| a.max(b));
-    // A straight road has no corners to stand closer in.
-    let scale = if most > 1e-9 {
-        (corner_density - 1.0) / most
-    } else {
-        0.0
-    };
-    near.iter_mut().for_each(|k| *k = 1.0 + scale * *k);
-    if road.closed() {
-        near.push(near[0]);
-    }
-    let mut sum = vec![0.0];
-    for pair in near.windows(2) {
-        sum.push(sum[sum.len() - 1] + 0.5 * (pair[0] + pair[1]));
-    }
-    let total = sum[sum.len() - 1];
-    let station = |i: usize| {
-        let wanted = total * i as f64 / steps as f64;
-        let after = sum.partition_point(|&x| x <= wanted).clamp(1, sum.len() - 1);
-        let share = (wanted - sum[after - 1]) / (sum[after] - sum[after - 1]);
-        ((after - 1) as f64 + share) * step
-    };
-    Ok((0..cross_sections)
-        .map(|i| if i == steps { length } else { station(i) })
-        .collect())
-}
-
-/// Means weighted by a raised cosine over `reach` neighbours on each side.
-fn averaged(values: &[f64], reach: usize, closed: bool) -> Vec<f64> {
-    let n = values.len() as isize;
-    let reach = (reach as isize).min(n / 2);
-    let weight = |k: isize| 0.5 + 0.5 * (PI * k as f64 / (reach + 1) as f64).cos();
-    (0..n)
-        .map(|i| {
-            let (mut sum, mut weights) = (0.0, 0.0);
-            for k in -reach..=reach {
-                let j = if closed {
-                    (i + k).rem_euclid(n)
-                } else {
-                    (i + k).clamp(0, n - 1)
-                };
-                sum += weight(k) * values[j as usize];
-                weights += weight(k);
-            }
-            sum / weights
-        })
-        .collect()
+    Ok((0..count).map(|i| length * i as f64 / steps).collect())
 }

@@ -58,7 +58,7 @@ fn hairpin(radius: f64, width: f64) -> Survey {
 #[test]
 fn circle_polygons_have_their_lengths() {
     let cross_sections = Shape::parse("circle:590:600").unwrap().unwrap();
-    let cross_sections = cross_sections.cross_sections(&Spacing::equal(361)).unwrap();
+    let cross_sections = cross_sections.cross_sections(361).unwrap();
     for (alpha, radius) in [(0.0, 590.0), (1.0, 600.0), (0.5, 595.0)] {
         let wanted = 2.0 * 361.0 * radius * (PI / 361.0).sin();
         assert!(
@@ -89,7 +89,7 @@ fn shapes_have_their_lengths_and_close() {
     ] {
         let shape = Shape::parse(name).unwrap().unwrap();
         assert_eq!(shape.name(), name);
-        let cross_sections = shape.cross_sections(&Spacing::equal(720)).unwrap();
+        let cross_sections = shape.cross_sections(720).unwrap();
         assert!(
             (cross_sections.length_m - length).abs() < 1e-6,
             "{name}: {}",
@@ -155,34 +155,14 @@ fn the_bundled_circuit_has_cross_sections() {
 }
 
 #[test]
-fn cross_sections_stand_denser_in_corners() {
-    let circuit = Circuit::silverstone_gp().unwrap();
-    let spacing = Spacing {
-        cross_sections: 400,
-        corner_density: 4.0,
-    };
-    let cross_sections = circuit.cross_sections_spaced(&spacing).unwrap();
-    let steps: Vec<f64> = cross_sections.station_m.windows(2).map(|s| s[1] - s[0]).collect();
-    let (least, most) = steps
-        .iter()
-        .fold((f64::INFINITY, 0.0f64), |(a, b), &s| (a.min(s), b.max(s)));
-    assert!(most / least > 3.0 && most / least < 4.1, "{least} {most}");
-    let tightest = (0..399).min_by(|&a, &b| steps[a].total_cmp(&steps[b])).unwrap();
-    assert!(circuit.curvature_at(cross_sections.station_m[tightest]).abs() > 0.02);
-    for density in [0.5, f64::NAN, 1e9] {
-        let spacing = Spacing {
-            cross_sections: 400,
-            corner_density: density,
-        };
-        assert!(circuit.cross_sections_spaced(&spacing).is_err());
-    }
-    assert!(circuit.cross_sections(2).is_err());
+fn too_few_cross_sections_are_refused() {
+    assert!(Circuit::silverstone_gp().unwrap().cross_sections(2).is_err());
 }
 
 #[test]
 fn a_hairpin_with_room_has_cross_sections_along_its_normals() {
     let line = hairpin(20.0, 12.0).as_surveyed().unwrap();
-    let cross_sections = line.cross_sections(&Spacing::equal(300)).unwrap();
+    let cross_sections = line.cross_sections(300).unwrap();
     for i in 0..300 {
         assert!((cross_sections.right_m[i].distance(cross_sections.left_m[i]) - 12.0).abs() < 1e-9);
     }
@@ -205,7 +185,7 @@ fn normals_that_cross_in_a_short_kink_are_turned_until_they_do_not() {
         .map(|i| line.curvature_at(0.1 * f64::from(i)))
         .fold(0.0, f64::max);
     assert!(tightest * 9.0 > 1.2, "the kink is no kink: {tightest}");
-    let cross_sections = line.cross_sections(&Spacing::equal(121)).unwrap();
+    let cross_sections = line.cross_sections(121).unwrap();
     for i in 0..120 {
         let forwards = cross_sections.right_m[i + 1] - cross_sections.right_m[i];
         let along = (cross_sections.left_m[i + 1] - cross_sections.left_m[i]).dot(forwards);
@@ -225,10 +205,7 @@ fn normals_that_cross_in_a_short_kink_are_turned_until_they_do_not() {
 fn a_hairpin_whose_edges_cross_is_refused_by_station() {
     // More road inside than the radius, all the way round.
     let tight = hairpin(8.0, 20.0).smoothed(&Smoothing::default()).unwrap();
-    let error = tight
-        .cross_sections(&Spacing::equal(200))
-        .unwrap_err()
-        .to_string();
+    let error = tight.cross_sections(200).unwrap_err().to_string();
     assert!(error.contains("test.csv: station"), "{error}");
     let error = tight.circuit().unwrap_err().to_string();
     assert!(error.contains("test.csv: station"), "{error}");
@@ -242,7 +219,7 @@ fn a_hairpin_whose_edges_cross_is_refused_by_station() {
     let last = points[points.len() - 1];
     points.extend((1..57).map(|i| last + 5.0 * f64::from(i) * back));
     let legs = survey(points, false, 14.0).as_surveyed().unwrap();
-    let error = legs.cross_sections(&Spacing::equal(120)).unwrap_err().to_string();
+    let error = legs.cross_sections(120).unwrap_err().to_string();
     assert!(
         error.contains("station") && error.contains("overlaps itself"),
         "{error}"
@@ -266,7 +243,7 @@ fn a_bridge_is_steep_or_announced() {
     assert!(flat.check().is_ok());
     let steep = eight(300.0);
     let line = steep.smoothed(&Smoothing::default()).unwrap();
-    line.cross_sections(&Spacing::equal(300)).unwrap();
+    line.cross_sections(300).unwrap();
     let (circuit, _) = line.circuit().unwrap();
     assert!(circuit.total_turn_rad().abs() < 1e-6);
     let cross_sections = circuit.cross_sections(300).unwrap();
@@ -324,7 +301,7 @@ fn an_open_road_keeps_its_ends() {
         .collect();
     let hill = survey(points.clone(), false, 6.0);
     let line = hill.as_surveyed().unwrap();
-    let cross_sections = line.cross_sections(&Spacing::equal(50)).unwrap();
+    let cross_sections = line.cross_sections(50).unwrap();
     assert!(!cross_sections.closed && cross_sections.station_m[49] == cross_sections.length_m);
     for (section, wanted) in [(0, points[0]), (49, points[99])] {
         assert!(
@@ -383,7 +360,7 @@ fn exports_read_back() {
     let path = folder.path().join("cuts.csv");
     cross_sections.write_racetrack(&path).unwrap();
     let again = Track::read(&path).unwrap();
-    let again = again.cross_sections(&Spacing::equal(1200), true).unwrap();
+    let again = again.cross_sections(1200, true).unwrap();
     for i in 0..1200 {
         assert!(again.right_m[i].distance(cross_sections.right_m[i]) < 0.05, "{i}");
         assert!(again.left_m[i].distance(cross_sections.left_m[i]) < 0.05, "{i}");
@@ -396,14 +373,13 @@ proptest! {
         radii in prop::collection::vec(20.0..120.0f64, 8..40),
         width in 1.0..60.0f64,
         cross_sections in 8usize..200,
-        density in 1.0..5.0f64,
         smooth: bool,
     ) {
         let n = radii.len() as f64;
         let points = radii.iter().enumerate().map(|(i, r)| *r * DVec2::from_angle(TAU * i as f64 / n));
         let survey = survey(points.collect(), true, width);
         let line = if smooth { survey.smoothed(&Smoothing::default()) } else { survey.as_surveyed() };
-        let result = line.and_then(|line| line.cross_sections(&Spacing { cross_sections, corner_density: density }));
+        let result = line.and_then(|line| line.cross_sections(cross_sections));
         match result {
             Ok(found) => {
                 prop_assert_eq!(found.len(), cross_sections);

@@ -4,7 +4,7 @@ use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
 use super::cutting::cross_sections;
 use super::relief::ReliefChange;
-use super::road::{Road, RoadFrame, Spacing, circuit};
+use super::road::{Road, RoadFrame, circuit};
 use crate::{Error, Result};
 use glam::DVec2;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -153,9 +153,9 @@ impl Shape {
     ///
     /// # Errors
     /// [`Error::Input`] for a shape or spacing out of range.
-    pub fn cross_sections(&self, spacing: &Spacing) -> Result<CrossSections> {
+    pub fn cross_sections(&self, count: usize) -> Result<CrossSections> {
         self.check()?;
-        cross_sections(&Shaped::new(*self), spacing)
+        cross_sections(&Shaped::new(*self), count)
     }
 
     /// The circuit. Its curvature is sampled every metre, so that the ends of a stadium's bends are ramps of a metre.

@@ -4,7 +4,6 @@ use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
 use super::load::CircuitSource;
 use super::reference::Smoothing;
-use super::road::Spacing;
 use super::shapes::Shape;
 use super::survey::Survey;
 use crate::Result;
@@ -77,12 +76,12 @@ impl Track {
     ///
     /// # Errors
     /// As [`Track::circuit`], and for a spacing out of range.
-    pub fn cross_sections(&self, spacing: &Spacing, as_surveyed: bool) -> Result<CrossSections> {
+    pub fn cross_sections(&self, count: usize, as_surveyed: bool) -> Result<CrossSections> {
         match self {
-            Self::Circuit(circuit) => circuit.cross_sections_spaced(spacing),
-            Self::Survey(survey, _) if as_surveyed => survey.as_surveyed()?.cross_sections(spacing),
-            Self::Survey(survey, smoothing) => survey.smoothed(smoothing)?.cross_sections(spacing),
-            Self::Shape(shape) => shape.cross_sections(spacing),
+            Self::Circuit(circuit) => circuit.cross_sections(count),
+            Self::Survey(survey, _) if as_surveyed => survey.as_surveyed()?.cross_sections(count),
+            Self::Survey(survey, smoothing) => survey.smoothed(smoothing)?.cross_sections(count),
+            Self::Shape(shape) => shape.cross_sections(count),
         }
     }
 }

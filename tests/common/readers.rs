@@ -12,7 +12,7 @@ use lapswarm::swarm::{
     Pso, WindowSwarm,
 };
 use lapswarm::telemetry::{ChannelMap, Log, LogOptions, Recording};
-use lapswarm::track::{Circuit, Smoothing, Spacing, Survey, SurveyOptions, Track};
+use lapswarm::track::{Circuit, Smoothing, Survey, SurveyOptions, Track};
 use lapswarm::vehicle::tyre::TyreFile;
 use lapswarm::vehicle::{Car, Envelope};
 use lapswarm::{Error, Result};
@@ -188,7 +188,7 @@ pub fn curvature(data: &[u8]) {
     let path = on_disk("circuit.toml", toml);
     on_disk("circuit.csv", table);
     if let Some(circuit) = taken_from_disk(Circuit::load(path))
-        && let Some(cross_sections) = taken(circuit.cross_sections_spaced(&Spacing::equal(50)))
+        && let Some(cross_sections) = taken(circuit.cross_sections(50))
     {
         assert!(
             cross_sections
@@ -209,7 +209,7 @@ fn survey(data: &[u8], name: &str) {
         };
         if let Some(survey) = taken(Survey::parse(data, name, &options))
             && let Some(line) = taken(survey.smoothed(&Smoothing::default()))
-            && let Some(cross_sections) = taken(line.cross_sections(&Spacing::equal(50)))
+            && let Some(cross_sections) = taken(line.cross_sections(50))
         {
             assert!(
                 cross_sections
@@ -381,7 +381,7 @@ pub fn survey_file(data: &[u8]) {
     let path = on_disk("surveyed.toml", toml);
     on_disk("survey.csv", table);
     if let Some(track) = taken_from_disk(Track::read(path))
-        && let Some(cross_sections) = taken(track.cross_sections(&Spacing::equal(50), false))
+        && let Some(cross_sections) = taken(track.cross_sections(50, false))
     {
         assert!(
             cross_sections

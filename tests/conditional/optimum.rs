@@ -8,7 +8,7 @@ use lapswarm::optimum::{
     shortest, spacing_m,
 };
 use lapswarm::random::Random;
-use lapswarm::track::{CrossSections, Shape, Spacing, Track};
+use lapswarm::track::{CrossSections, Shape, Track};
 use lapswarm::vehicle::{Envelope, EnvelopeRow};
 use std::f64::consts::{PI, TAU};
 
@@ -44,14 +44,14 @@ fn racer() -> PointMass {
 
 fn shape(text: &str, cross_sections: usize) -> CrossSections {
     let shape = Shape::parse(text).unwrap().unwrap();
-    shape.cross_sections(&Spacing::equal(cross_sections)).unwrap()
+    shape.cross_sections(cross_sections).unwrap()
 }
 
 /// The surveyed Silverstone as it stands, for a car of this width (m).
 fn silverstone(cross_sections: usize, car_width_m: f64) -> CrossSections {
     let cut = Track::read(survey().expect("the harness has looked"))
         .unwrap()
-        .cross_sections(&Spacing::equal(cross_sections), true);
+        .cross_sections(cross_sections, true);
     cut.unwrap().narrowed(car_width_m).unwrap()
 }
 
@@ -432,7 +432,7 @@ fn from_many_starts(cross_sections: &CrossSections, car: &PointMass) -> (LineMap
 /// Eight starts, one end: to the share that a descent gives up at, 1e-6 of the lap for each step, and some of them.
 fn every_start_ends_at_the_same_lap_of_the_bundled_circuit() {
     let track = Track::load("silverstone_gp").unwrap();
-    let cross_sections = track.cross_sections(&Spacing::equal(480), true).unwrap();
+    let cross_sections = track.cross_sections(480, true).unwrap();
     let (_, ends) = from_many_starts(&cross_sections.narrowed(2.0).unwrap(), &racer());
     let best = ends.iter().map(|e| e.value).fold(f64::INFINITY, f64::min);
     assert!(ends.iter().all(|e| e.value / best - 1.0 < 5e-5));
@@ -492,7 +492,7 @@ fn every_start_ends_at_the_same_lap_of_the_surveyed_silverstone() {
 
 fn sectors_summed_leave_the_links_out() {
     let bundled = Track::load("silverstone_gp").unwrap();
-    let cross_sections = bundled.cross_sections(&Spacing::equal(360), true).unwrap();
+    let cross_sections = bundled.cross_sections(360, true).unwrap();
     sectors_summed(&cross_sections, None);
 }
 

@@ -3,7 +3,7 @@
 use crate::common::harness::survey;
 use glam::DVec2;
 use lapswarm::line::{FineLine, PointMass};
-use lapswarm::track::{Circuit, CrossSections, ReferenceLine, Smoothing, Spacing, Survey, SurveyOptions};
+use lapswarm::track::{Circuit, CrossSections, ReferenceLine, Smoothing, Survey, SurveyOptions};
 use lapswarm::vehicle::{Envelope, EnvelopeRow};
 use std::path::PathBuf;
 
@@ -83,7 +83,7 @@ fn the_surveyed_silverstone_is_cut_as_others_cut_it() {
     let survey = Survey::read(survey_file(), &SurveyOptions::default()).unwrap();
     assert!(survey.closed && survey.centre_m.len() == 1178);
     let raw = survey.as_surveyed().unwrap();
-    let cross_sections = raw.cross_sections(&Spacing::equal(360)).unwrap();
+    let cross_sections = raw.cross_sections(360).unwrap();
     // Figures of the same construction in Python (SciPy's CubicSpline with periodic ends over chord lengths). On these
     // cross-sections Clarabel gives a shortest path of 5710.944 m, and 5734.241 m for a car 2 m wide.
     assert!((raw.length_m() - 5887.369016).abs() < 1e-5, "{}", raw.length_m());
@@ -105,7 +105,7 @@ fn the_surveyed_silverstone_is_cut_as_others_cut_it() {
         );
     }
     // The edges lie where they lay, and bend less on their way.
-    let edges = |line: &ReferenceLine| line.cross_sections(&Spacing::equal(1962)).unwrap();
+    let edges = |line: &ReferenceLine| line.cross_sections(1962).unwrap();
     let (rough, even) = (edges(&raw), edges(&smooth));
     let bending = |p: &[DVec2]| -> f64 {
         (0..p.len())

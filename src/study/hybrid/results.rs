@@ -182,7 +182,7 @@ pub struct FrontFigures {
     pub energy_mj: f64,
     /// Energy that did (MJ).
     pub deployed_mj: f64,
-    /// Time of the exact optimum (s).
+    /// Time of the reference optimum (s).
     pub lap_time_s: f64,
 }
 
@@ -191,7 +191,7 @@ pub struct FrontFigures {
 pub struct DeploymentFigures {
     /// Energy that may leave the store (MJ).
     pub energy_mj: f64,
-    /// Time of the exact optimum (s).
+    /// Time of the reference optimum (s).
     pub exact_lap_time_s: f64,
     /// Energy that it uses (MJ).
     pub exact_deployed_mj: f64,
@@ -207,7 +207,7 @@ pub struct DeploymentFigures {
     pub swarm_lap_time_s: f64,
     /// Energy that it uses (MJ).
     pub swarm_deployed_mj: f64,
-    /// How much slower than the exact optimum it is (s).
+    /// How much slower than the reference optimum it is (s).
     pub swarm_above_exact_s: f64,
     /// What the swarm's deployment gains on the engine alone (s).
     pub gain_s: f64,
@@ -215,7 +215,7 @@ pub struct DeploymentFigures {
     pub zones: usize,
     /// The energy that an endless store is used for (MJ): no greater budget binds.
     pub binds_up_to_mj: f64,
-    /// Time against energy, by the exact optimum.
+    /// Time against energy, by the reference optimum.
     pub front: Vec<FrontFigures>,
     /// Laps on the swarm's front between the study's objectives.
     pub swarm_front_size: Option<usize>,
@@ -358,7 +358,7 @@ impl HybridSummary {
         }
         if let Some(d) = &self.deployment {
             text += &format!(
-                "{:.2} MJ beside the engine: swarm {:.3} s with {:.3} MJ over {} zones, exact optimum {:.3} s with {:.3} MJ; \
+                "{:.2} MJ beside the engine: swarm {:.3} s with {:.3} MJ over {} zones, reference optimum {:.3} s with {:.3} MJ; \
                  {:.3} s gained\nNo more than {:.2} MJ are of use. Time against energy:\n",
                 d.energy_mj,
                 d.swarm_lap_time_s,

@@ -12,6 +12,7 @@ use crate::evaluate::energy::open_hybrid_evaluator;
 use crate::line::energy::{Gates, Mode};
 use crate::study::framework::journal::Recorder;
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
+use rayon::prelude::*;
 use std::cell::Cell;
 use std::time::Instant;
 
@@ -74,17 +75,20 @@ pub(super) fn deploy(work: Work<'_, Hybrid>) -> Result<Option<Outcome>> {
         let _ = tell("reference optimum", 0, format!("{:.4} s", exact.lap.time));
         let unbound = setup.exact(1e9, Some(&exact.shares))?;
         let mut front = Vec::new();
-        let mut before: Option<Vec<f64>> = None;
-        for &mj in &settings.budgets_mj {
-            if !interrupted.get() {
-                let found = setup.exact(1e6 * mj, before.as_deref())?;
+        // Each from no deployment at all: from that of another energy, some end milliseconds slower.
+        for budgets_mj in settings.budgets_mj.chunks(rayon::current_num_threads()) {
+            if interrupted.get() {
+                break;
+            }
+            let found = budgets_mj.par_iter().map(|mj| setup.exact(1e6 * mj, None));
+            let found: Vec<_> = found.collect::<Result<_>>()?;
+            for (mj, found) in budgets_mj.iter().zip(found) {
                 let _ = tell("front", 0, format!("{mj} MJ: {:.4} s", found.lap.time));
                 front.push(FrontFigures {
                     energy_mj: 1e6 * mj / 1e6,
                     deployed_mj: found.lap.deployed / 1e6,
                     lap_time_s: found.lap.time,
                 });
-                before = Some(found.shares);
             }
         }
         let began = Instant::now();

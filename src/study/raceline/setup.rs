@@ -8,7 +8,7 @@ use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadEdges, TERMS};
 use crate::optimum::{ReferenceSolvers, mended};
 use crate::study::framework::Plan;
-use crate::track::{CrossSections, Spacing, Track, racetrack_csv};
+use crate::track::{CrossSections, Track, racetrack_csv};
 use crate::vehicle::limits::{SpeedRange, car_envelope, car_envelope_under_loads};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
@@ -49,15 +49,15 @@ pub struct Setup {
 pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     settings.validate()?;
     let track = Track::load(&settings.track)?;
-    let few = track.cross_sections(&Spacing::equal(FEW), settings.as_surveyed)?;
+    let few = track.cross_sections(FEW, settings.as_surveyed)?;
     let sections = settings.sections_on(few.length_m);
     settings.check_sectors_of(sections)?;
     let road = track
-        .cross_sections(&Spacing::equal(sections), settings.as_surveyed)?
+        .cross_sections(sections, settings.as_surveyed)?
         .with_smooth_reference(REFERENCE_M);
     let cut = |step_m: f64| {
         let close = ((road.length_m / step_m).ceil() as usize).clamp(sections, 1_000_000);
-        track.cross_sections(&Spacing::equal(close), settings.as_surveyed)
+        track.cross_sections(close, settings.as_surveyed)
     };
     // Inside a bend that is hardly wider than its road, cross-sections may be too close to one another to be turned apart.
     let dense = cut(EDGE_M).or_else(|_| cut(2.0 * EDGE_M))?;

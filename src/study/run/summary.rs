@@ -177,7 +177,7 @@ impl Summary {
         if let Some(e) = &self.energy {
             text += &format!(
                 "Energy     By the engine alone the line takes {:.2} s and {:.2} l; the same lap with the charge sustained {:.2} l. \
-                 Deployed where it pays, {:.2} MJ buy {:.2} s (the exact optimum {:.2} s).\n",
+                 Deployed where it pays, {:.2} MJ buy {:.2} s (the reference optimum {:.2} s).\n",
                 e.engine_lap_time_s,
                 e.engine_fuel_l,
                 e.sustaining_fuel_l,

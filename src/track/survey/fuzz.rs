@@ -66,7 +66,7 @@ proptest! {
         if let Ok(survey) = &result {
             // What is taken for a road is a road: its spline and cross-sections are finite, or refused.
             if let Ok(line) = survey.smoothed(&crate::track::Smoothing::default())
-                && let Ok(cross_sections) = line.cross_sections(&crate::track::Spacing::equal(50))
+                && let Ok(cross_sections) = line.cross_sections(50)
             {
                 prop_assert!(cross_sections.right_m.iter().chain(&cross_sections.left_m).all(|p| p.is_finite()));
             }

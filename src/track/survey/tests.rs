@@ -350,7 +350,7 @@ fn two_edges_have_a_middle_whatever_their_points() {
     }
     road.smoothed(&crate::track::Smoothing::default())
         .unwrap()
-        .cross_sections(&crate::track::Spacing::equal(100))
+        .cross_sections(100)
         .unwrap();
 }
 
@@ -370,9 +370,7 @@ fn the_edges_of_a_circuit_give_it_back() {
         assert!((width - 15.0).abs() < 0.6, "{width} at {foot:?}");
     }
     let cross_sections = survey.as_surveyed().unwrap();
-    let cross_sections = cross_sections
-        .cross_sections(&crate::track::Spacing::equal(360))
-        .unwrap();
+    let cross_sections = cross_sections.cross_sections(360).unwrap();
     assert!(
         (cross_sections.length_m - circuit.length_m).abs() < 5.0,
         "{}",
@@ -625,9 +623,7 @@ fn a_toml_file_says_what_a_survey_cannot() {
     );
     assert!(circuit.section("top").is_ok() && circuit.corners[0].name == "One");
     let cross_sections = crate::track::Track::load(path.to_str().unwrap()).unwrap();
-    let cross_sections = cross_sections
-        .cross_sections(&crate::track::Spacing::equal(100), false)
-        .unwrap();
+    let cross_sections = cross_sections.cross_sections(100, false).unwrap();
     assert_eq!(
         (cross_sections.sections.len(), cross_sections.corners.len()),
         (1, 1)

@@ -220,7 +220,7 @@ pub fn motor_on(outcome: &Outcome) -> Curves {
     Curves::new("Where the motor works", with_motor.map(panel).collect::<Vec<_>>())
 }
 
-/// Time against energy: the exact optima, the swarm's lap, the scenarios with the motor beside the engine.
+/// Time against energy: the reference optima, the swarm's lap, the scenarios with the motor beside the engine.
 pub fn time_energy(outcome: &Outcome) -> Option<Curves> {
     let o = outcome.optimised.as_ref()?;
     let mut exact: Vec<(f64, f64)> = o
@@ -240,7 +240,7 @@ pub fn time_energy(outcome: &Outcome) -> Option<Curves> {
         Panel::new("Lap time against energy out of the store in a lap")
             .x("energy", "MJ")
             .y("lap time", "s")
-            .points("exact optimum (energy allowed)", exact)
+            .points("reference optimum (energy allowed)", exact)
             .dots(
                 "scenarios (energy used)",
                 outcome.scenarios.iter().map(|s| used(&s.additional)),

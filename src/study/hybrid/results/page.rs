@@ -47,7 +47,7 @@ pub fn write(folder: &Path, solved: &Solved<'_, Hybrid>, summary: &HybridSummary
     if let Some(figure) = figures::time_energy(outcome) {
         page.section(
             "Time against energy",
-            "Each point of the curve is an exact optimum of its energy.",
+            "Each point of the curve is a reference optimum of its energy.",
         );
         page.figure(folder.join("time_energy.svg"), &figure)?;
     }
@@ -116,13 +116,13 @@ fn head(page: &mut HtmlReport, summary: &HybridSummary) {
     page.tile("Engine alone", format!("{:.3}", summary.engine_lap_time_s), "s");
     if let Some(d) = &summary.deployment {
         page.sentence(format!(
-            "{:.2} MJ beside it, shared out by the swarm over {} zones, gain {:.2} s: {:.2} s. The exact optimum is {:.2} s, and \
+            "{:.2} MJ beside it, shared out by the swarm over {} zones, gain {:.2} s: {:.2} s. The reference optimum is {:.2} s, and \
              no more than {:.2} MJ are of use on this lap.",
             d.energy_mj, d.zones, d.gain_s, d.swarm_lap_time_s, d.exact_lap_time_s, d.binds_up_to_mj
         ));
         page.tile("With the motor", format!("{:.3}", d.swarm_lap_time_s), "s");
         page.tile("Gained", format!("{:.3}", d.gain_s), "s");
-        page.tile("Exact optimum", format!("{:.3}", d.exact_lap_time_s), "s");
+        page.tile("Reference optimum", format!("{:.3}", d.exact_lap_time_s), "s");
         page.tile("Energy out", format!("{:.2}", d.swarm_deployed_mj), "MJ");
     }
     for sizing in &summary.sizing {

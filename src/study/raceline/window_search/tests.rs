@@ -1,5 +1,5 @@
 use super::*;
-use crate::track::{Shape, Spacing, Track};
+use crate::track::{Shape, Track};
 use std::f64::consts::PI;
 
 fn found(
@@ -24,7 +24,7 @@ fn found(
 #[test]
 fn the_ring_is_driven_along_the_inside() {
     let ring = Shape::parse("circle:590:600").unwrap().unwrap();
-    let cross_sections = ring.cross_sections(&Spacing::equal(361)).unwrap();
+    let cross_sections = ring.cross_sections(361).unwrap();
     let exact = 361.0 * 2.0 * 590.0 * (PI / 361.0).sin();
     for seed in 1..=3 {
         let settings = LineSearchSettings {
@@ -40,7 +40,7 @@ fn the_ring_is_driven_along_the_inside() {
 /// The bundled circuit.
 fn circuit(sections: usize) -> CrossSections {
     let track = Track::load("silverstone_gp").unwrap();
-    track.cross_sections(&Spacing::equal(sections), false).unwrap()
+    track.cross_sections(sections, false).unwrap()
 }
 
 /// The line found is within 0.05 % of the exact shortest one.
