@@ -35,6 +35,9 @@ const ROLLING_MPS: f64 = 12.0;
 /// Least error of a radius that is corrected, as a share of it: of wheels that roll freely, and of driven ones, whose slip under
 /// power looks like a smaller radius.
 const LEAST_RADIUS: [f64; 2] = [0.002, 0.01];
+/// Acceleration for each unit of slip (m/s^2) of a car with soft tyres, driven at one axle: 15 N for each newton of load on 55 % of the
+/// weight.
+const SOFT_MPS2: f64 = 80.0;
 /// Half of the interval over which speed is differentiated for slip, s.
 const SLIP_S: f64 = 0.3;
 /// The steering wheel's angle is told from the road wheels' by this many standard errors, at least.
@@ -373,6 +376,9 @@ struct Excess {
     standard_error: f64,
     /// What slip explains of it, twice the root mean square: a smaller excess may be slip that goes with more than that.
     slip: f64,
+    /// Mean slip of soft tyres at the accelerations of driven wheels. An engine at full power against the drag has about the same slip
+    /// at all speeds, as a smaller radius has.
+    power: f64,
     samples: usize,
 }
 
@@ -389,6 +395,7 @@ fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
     let one = vec![1.0; log.samples()];
     let per_metre = log.yaw_rate_radps.iter().zip(&log.vx_mps);
     let turning: Vec<f64> = per_metre.map(|(r, v)| r / v.max(1.0)).collect();
+    let mut power = 0.0;
     let (value, standard_error, samples, slip) = if driven {
         // Power is needed against the drag as well, which grows with the square of speed.
         let drag: Vec<f64> = log.vx_mps.iter().map(|v| v * v).collect();
@@ -396,8 +403,12 @@ fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
         let found = regression(excess, [&one, &turning, &accel, &drag], &mask)?;
         let [of_all, _, of_accel, of_drag] = found.factors;
         let looked_at = (0..log.samples()).filter(|i| mask[*i]);
-        let squares = looked_at.map(|i| (of_accel * accel[i] + of_drag * drag[i]).powi(2));
-        let slip = 2.0 * (squares.sum::<f64>() / found.samples.max(1) as f64).sqrt();
+        let count = found.samples.max(1) as f64;
+        let squares = looked_at
+            .clone()
+            .map(|i| (of_accel * accel[i] + of_drag * drag[i]).powi(2));
+        let slip = 2.0 * (squares.sum::<f64>() / count).sqrt();
+        power = looked_at.map(|i| accel[i].max(0.0)).sum::<f64>() / (count * SOFT_MPS2);
         // Noise makes too much of a drag that is not there. What counts is what is left either way.
         let least = of_all.abs().min(without.factors[0].abs());
         let value = if of_all * without.factors[0] > 0.0 {
@@ -415,6 +426,7 @@ fn steady(log: &Log, excess: &[f64], driven: bool) -> Option<Excess> {
         value,
         standard_error,
         slip,
+        power,
         samples,
     })
 }
@@ -452,7 +464,8 @@ fn rolling_radii(log: &mut Log, declared: &Declared) {
         let free = declared.radius_is_free[axle];
         let of_axle = LEAST_RADIUS[usize::from(driven)]
             .max(SURE_RADIUS * common.standard_error)
-            .max(common.slip);
+            .max(common.slip)
+            .max(if common.value > 0.0 { common.power } else { 0.0 });
         let of_sides = LEAST_RADIUS[0]
             .max(2.0 * SURE_RADIUS * half.standard_error)
             .max(2.0 * half.slip);

@@ -395,6 +395,7 @@ mod tests {
             free: Unknowns {
                 among: Vec::new(),
                 auto: true,
+                unsaid: false,
             },
             ..IdentifySettings::default()
         };

@@ -47,11 +47,19 @@ pub struct Unknowns {
     pub among: Vec<FreeParameter>,
     /// Whether those of them are found that the log can tell, and not all.
     pub auto: bool,
+    /// Whether nothing was said: on the bundled lap all of them are found, on a log of one's own those that it can tell of what is usually
+    /// not known of a car.
+    #[serde(default)]
+    pub unsaid: bool,
 }
 
 impl From<Vec<FreeParameter>> for Unknowns {
     fn from(among: Vec<FreeParameter>) -> Self {
-        Self { among, auto: false }
+        Self {
+            among,
+            auto: false,
+            unsaid: false,
+        }
     }
 }
 
@@ -167,8 +175,8 @@ settings! {
             "The circuit that sections are named on: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape";
         truth: Option<String> ["-"] = None, optional(name_or_file()).example("\"gt\""),
             "The car that drove the log, where it is known: the parameters' errors are stated against it";
-        free: Unknowns ["-"] = usual_unknowns(), of(Bounds),
-            "Parameters to find, each with its least and greatest value; with auto those that the log can tell, by cross-validation, of these or else of what is usually not known of a car";
+        free: Unknowns ["-"] = usual_unknowns(), of(Bounds).example("\"auto\""),
+            "Parameters to find, each with its least and greatest value; auto finds those that the log can tell, of these or of what is usually not known of a car; unset, it is auto on a log of your own and the thesis's 22 on the bundled lap";
         free_from: Option<PathBuf> ["-"] = None, optional(file()).example("\"runs/sensitivity-001\""),
             "A run of sensitivity: its parameters that matter most are found, within the bounds of free or else over the range that it moved them";
         most: usize ["-"] = 12, count(1, 1000),
@@ -247,7 +255,10 @@ fn usual_unknowns() -> Unknowns {
         lower,
         upper,
     };
-    USUAL_UNKNOWNS.map(free).to_vec().into()
+    Unknowns {
+        unsaid: true,
+        ..USUAL_UNKNOWNS.map(free).to_vec().into()
+    }
 }
 
 /// Names and bounds of [`usual_unknowns`].
@@ -298,7 +309,7 @@ impl IdentifySettings {
     /// [`Error::Io`] if the study's summary cannot be read, [`Error::Input`] if it is another study's.
     pub(super) fn freed(&self, car: &Car) -> Result<Vec<FreeParameter>> {
         let Some(run) = &self.free_from else {
-            if self.free.is_empty() {
+            if self.free.is_empty() || self.free.unsaid && self.chooses() {
                 return Ok(pool::unsure_of(car));
             }
             return Ok(self.free.to_vec());
@@ -331,6 +342,11 @@ impl IdentifySettings {
             .take(self.most)
             .map(with_bounds)
             .collect())
+    }
+
+    /// Whether the log chooses what is found.
+    pub(super) fn chooses(&self) -> bool {
+        self.free.auto || self.free.unsaid && self.log.is_some() && self.free_from.is_none()
     }
 
     /// What looks for a front.
@@ -377,7 +393,10 @@ struct Bounds;
 
 impl Kind<Unknowns> for Bounds {
     fn read(&self, table: &Table<'_>, key: &str, _: &str, _: &Path) -> Result<Option<Unknowns>> {
-        let auto = |among: Vec<FreeParameter>| Unknowns { among, auto: true };
+        let auto = |among: Vec<FreeParameter>| Unknowns {
+            auto: true,
+            ..among.into()
+        };
         if !table.is_table(key) {
             return match table.string(key)? {
                 None => Ok(None),
@@ -404,6 +423,9 @@ impl Kind<Unknowns> for Bounds {
     }
 
     fn write(&self, free: &Unknowns) -> Option<Written> {
+        if free.unsaid {
+            return None;
+        }
         let auto = if free.auto { "auto = true\n" } else { "" };
         let row = |free: &FreeParameter| {
             let dotted = free.name.contains('.');
@@ -453,7 +475,7 @@ impl Kind<Unknowns> for Bounds {
         } else {
             among
         };
-        Ok(Unknowns { among, auto })
+        Ok(Unknowns { auto, ..among.into() })
     }
 
     fn value_name(&self) -> &'static str {

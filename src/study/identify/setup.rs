@@ -170,25 +170,26 @@ pub(in crate::study) fn set_up_until(settings: &IdentifySettings, stop: &AtomicB
         .map(|s| s.measured[0])
         .fold(f64::INFINITY, f64::min);
     // As fine as the car that the search starts from needs it at the slowest place.
-    let substeps = settings
+    let mut substeps = settings
         .substeps
         .unwrap_or_else(|| steps_of(&car, slowest, log.dt_s));
     let scales = channel_scales(&samples, &fit_windows);
-    let problem = |freed: &[FreeParameter], windows: Vec<Window<f64>>| -> Result<ReplayProblem> {
-        let weights = objective_weights(settings, &scales, &windows, log.dt_s);
-        let mut problem = ReplayProblem::new(
-            car.clone(),
-            free_parameters(freed, &car)?,
-            samples.clone(),
-            windows,
-            (log.dt_s, substeps),
-            settings.norm,
-            weights,
-        )?;
-        problem.start_as_driven_by(&car.to_flat());
-        Ok(problem)
-    };
-    let choice = if settings.free.auto {
+    let problem =
+        |freed: &[FreeParameter], windows: Vec<Window<f64>>, substeps: usize| -> Result<ReplayProblem> {
+            let weights = objective_weights(settings, &scales, &windows, log.dt_s);
+            let mut problem = ReplayProblem::new(
+                car.clone(),
+                free_parameters(freed, &car)?,
+                samples.clone(),
+                windows,
+                (log.dt_s, substeps),
+                settings.norm,
+                weights,
+            )?;
+            problem.start_as_driven_by(&car.to_flat());
+            Ok(problem)
+        };
+    let choice = if settings.chooses() {
         let looked_at = match cut.0 {
             Some(_) => fit_windows.clone(),
             None => windowed(in_windows, &fitted)?.0,
@@ -197,13 +198,20 @@ pub(in crate::study) fn set_up_until(settings: &IdentifySettings, stop: &AtomicB
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         };
-        let choice = choose(&problem(&freed, looked_at)?, &scales, &mut watch)?;
+        let looked_at = problem(&freed, looked_at, substeps)?;
+        let choice = choose(&looked_at, &scales, &mut watch)?;
         // A choice has the names that the car gives its parameters, and not what they may be called besides.
         let chosen = |free: &FreeParameter| {
             car.parameter(&free.name)
                 .is_some_and(|p| choice.names.contains(&p.name))
         };
         freed.retain(chosen);
+        // The car that is found may be stiffer than the one that the search starts from.
+        if settings.substeps.is_none() {
+            let replay = problem(&freed, fit_windows.clone(), substeps)?;
+            let found = choice.candidate(&replay).map(|found| replay.flat(&found));
+            substeps = found.map_or(substeps, |flat| replay.steps_needed(&flat).max(substeps));
+        }
         Some(choice)
     } else {
         None
@@ -211,7 +219,7 @@ pub(in crate::study) fn set_up_until(settings: &IdentifySettings, stop: &AtomicB
     let mut windows_left_out = 0;
     if let Some(choice) = choice.as_ref().filter(|_| cut.0.is_some()) {
         // A window in which the chosen car is lost would lose nearly every candidate, and all that the others tell with it.
-        let replay = problem(&freed, fit_windows.clone())?;
+        let replay = problem(&freed, fit_windows.clone(), substeps)?;
         if let Some(found) = choice.candidate(&replay) {
             let flat = replay.flat(&found);
             let windows = replay.plan.windows.iter();
@@ -226,9 +234,9 @@ pub(in crate::study) fn set_up_until(settings: &IdentifySettings, stop: &AtomicB
             }
         }
     }
-    let replay = problem(&freed, fit_windows)?;
+    let replay = problem(&freed, fit_windows, substeps)?;
     let holdout = (!held_windows.is_empty())
-        .then(|| problem(&freed, held_windows))
+        .then(|| problem(&freed, held_windows, substeps))
         .transpose()?;
     let truth = truth_car.map(|truth| replay.free.values_in(&truth.to_flat()));
     Ok(Setup {
