@@ -240,12 +240,24 @@ class LineSetup:
 
 
 @dataclass(frozen=True)
+class SectorShape:
+    """The shape of a line within a sector."""
+
+    length_m: float
+    gamma_1pm: float
+
+
+@dataclass(frozen=True)
 class LineSector:
-    """A sector of a line that was looked for in several, lengths in metres."""
+    """A sector of a line that was looked for in several; beside it the road's edges and its middle."""
 
     sections: int
     length_m: float
     link_m: float
+    gamma_1pm: float
+    right: SectorShape
+    middle: SectorShape
+    left: SectorShape
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ use lapswarm::study::reproduce::{
                   run folder, with the page of its study."
 )]
 pub struct Arguments {
-    /// A chapter: 2, 3, 5, 6 or 7; may be repeated [default: all]
+    /// A chapter, 2 to 7; may be repeated [default: all]
     #[arg(long, value_name = "N")]
     chapter: Vec<u8>,
     /// A subset: fewer settings, fewer seeds

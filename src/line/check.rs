@@ -3,7 +3,7 @@
 use super::fine::FineLine;
 use crate::track::CrossSections;
 use glam::DVec2;
-use std::ops::RangeInclusive;
+use std::ops::Range;
 
 /// A car seen from above: a rectangle whose middle follows the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,19 +72,49 @@ pub fn check_line(line: &FineLine, right_m: &[DVec2], left_m: &[DVec2], car: &Ca
 ///
 /// A place on the road has a cross-section abreast of it, and its distances to the edges are those to the pieces near the ends of
 /// that one. Another piece of road that comes near, above a bridge or beside a hairpin, does not matter.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct RoadEdges<'a> {
     right_m: &'a [DVec2],
     left_m: &'a [DVec2],
     closed: bool,
     /// Mean distance between neighbouring cross-sections (m).
     step_m: f64,
+    /// Of the right edge, the left one, and the middles.
+    boxes: [Boxes; 3],
+}
+
+/// The rectangles about [`TOGETHER`] pieces of a line each: where all of a rectangle is far, so are its pieces.
+#[derive(Clone, Debug, Default)]
+struct Boxes(Vec<[DVec2; 2]>);
+
+/// Pieces of a line in one rectangle.
+const TOGETHER: usize = 8;
+
+impl Boxes {
+    /// Those about the pieces between `n` points.
+    fn about(n: usize, point: impl Fn(usize) -> DVec2) -> Self {
+        let about = |first: usize| {
+            let own = (first..=(first + TOGETHER).min(n)).map(|i| point(i % n));
+            own.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], p| {
+                [low.min(p), high.max(p)]
+            })
+        };
+        Self((0..n).step_by(TOGETHER).map(about).collect())
+    }
+
+    /// The square of the distance (m^2) of a point from the rectangle about piece `i`.
+    fn distance_squared(&self, i: usize, point: DVec2) -> f64 {
+        let [low, high] = self.0[i / TOGETHER];
+        point.clamp(low, high).distance_squared(point)
+    }
 }
 
 /// How far along the road the edge that a car comes near may be from the cross-section abreast of it (m).
 const REACH_M: f64 = 40.0;
 /// Distance (m) that a line of the wrong direction counts as further away, where its first place is looked for.
 const TURNED_M: f64 = 50.0;
+/// Share by which squares of distances from two pieces of an edge may differ that are one.
+const SAME: f64 = 1e-12;
 /// Swing of a car's corners that is left out (m).
 const LEAST_SWING_M: f64 = 0.001;
 
@@ -97,12 +127,18 @@ impl<'a> RoadEdges<'a> {
             left_m: &left_m[..n],
             closed,
             step_m: 1.0,
+            boxes: Default::default(),
         };
         let steps = n - usize::from(!closed && n > 0);
         let length_m: f64 = (0..steps)
             .map(|i| edges.middle(i).distance(edges.middle((i + 1) % n)))
             .sum();
         edges.step_m = (length_m / steps.max(1) as f64).max(1e-3);
+        edges.boxes = [
+            Boxes::about(n, |i| edges.right_m[i]),
+            Boxes::about(n, |i| edges.left_m[i]),
+            Boxes::about(n, |i| edges.middle(i)),
+        ];
         edges
     }
 
@@ -114,20 +150,37 @@ impl<'a> RoadEdges<'a> {
         0.5 * (self.right_m[i] + self.left_m[i])
     }
 
-    /// Cross-sections from `reach_m` before one to as far behind it.
-    fn around(&self, i: usize, reach_m: f64) -> RangeInclusive<isize> {
-        let reach = (reach_m / self.step_m).ceil() as isize + 1;
-        let (i, n) = (i as isize, self.len() as isize);
-        if self.closed {
+    /// Cross-sections from `reach_m` before one to as far behind it, leaving out the last `less`. They come in runs of one rectangle
+    /// each, the one's own first.
+    fn around(&self, i: usize, reach_m: f64, less: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+        let reach = (reach_m / self.step_m).ceil() as usize + 1;
+        let n = self.len();
+        let (first, count) = if self.closed {
             let reach = reach.min(n / 2);
-            i - reach..=i + reach
+            (i + n - reach, 2 * reach + 1)
         } else {
-            (i - reach).max(0)..=(i + reach).min(n - 1)
-        }
+            let first = i.saturating_sub(reach);
+            (first, (i + reach).min(n - 1) - first + 1)
+        };
+        let (mut next, mut left) = (first % n, count - less);
+        let runs = std::iter::from_fn(move || {
+            let end = (next + left).min((next / TOGETHER + 1) * TOGETHER).min(n);
+            let run = next..end;
+            left -= run.len();
+            next = end % n;
+            (!run.is_empty()).then_some(run)
+        });
+        let own = runs.clone().find(|run| run.contains(&i));
+        own.into_iter().chain(runs)
     }
 
-    fn index(&self, i: isize) -> usize {
-        i.rem_euclid(self.len() as isize) as usize
+    /// One of the edges, with its rectangles.
+    fn edge(&self, left: bool) -> (&'a [DVec2], &Boxes) {
+        if left {
+            (self.left_m, &self.boxes[1])
+        } else {
+            (self.right_m, &self.boxes[0])
+        }
     }
 
     /// The cross-section abreast of each of these points (m), which follow one another along the road.
@@ -138,10 +191,8 @@ impl<'a> RoadEdges<'a> {
         let way = (*second - *first).normalize_or_zero();
         // Where one road crosses another, both are near: the line runs along its own.
         let away = |i: usize| {
-            let (before, after) = (
-                self.middle(self.index(i as isize - 1)),
-                self.middle((i + 1) % self.len()),
-            );
+            let n = self.len();
+            let (before, after) = (self.middle((i + n - 1) % n), self.middle((i + 1) % n));
             let turned = 1.0 - (after - before).normalize_or_zero().dot(way);
             first.distance(self.middle(i)) + TURNED_M * turned
         };
@@ -152,11 +203,20 @@ impl<'a> RoadEdges<'a> {
         points_m
             .iter()
             .map(|point| {
-                let distance = |i: &isize| point.distance_squared(self.middle(self.index(*i)));
-                let near = self.around(at, REACH_M.max(2.0 * point.distance(last)));
+                let near = self.around(at, REACH_M.max(2.0 * point.distance(last)), 0);
                 last = *point;
-                let nearest = near.min_by(|i, j| distance(i).total_cmp(&distance(j)));
-                at = nearest.map_or(at, |i| self.index(i));
+                let mut nearest = f64::INFINITY;
+                for run in near {
+                    if self.boxes[2].distance_squared(run.start, *point) > nearest {
+                        continue;
+                    }
+                    for i in run {
+                        let distance = point.distance_squared(self.middle(i));
+                        if distance < nearest {
+                            (nearest, at) = (distance, i);
+                        }
+                    }
+                }
                 at
             })
             .collect()
@@ -164,27 +224,34 @@ impl<'a> RoadEdges<'a> {
 
     /// Distance of a point inwards from an edge (m), near a cross-section; negative beyond the edge.
     pub fn inside(&self, point: DVec2, abreast: usize, left: bool) -> f64 {
-        let edge = if left { self.left_m } else { self.right_m };
-        let near = self.around(abreast, REACH_M);
-        let mut nearest = f64::INFINITY;
+        let (edge, boxes) = self.edge(left);
+        let mut nearest = f64::MAX;
         let mut leftward = 0.0;
-        for i in *near.start()..*near.end() {
-            let (from, to) = (edge[self.index(i)], edge[self.index(i + 1)]);
-            let along = to - from;
-            let square = along.length_squared();
-            if square == 0.0 {
+        for run in self.around(abreast, REACH_M, 1) {
+            if boxes.distance_squared(run.start, point) > (1.0 + 2.0 * SAME) * nearest {
                 continue;
             }
-            let away = point - from;
-            let share = (away.dot(along) / square).clamp(0.0, 1.0);
-            let distance = (away - share * along).length_squared();
-            // How nearly the point lies at right angles to the segment. Where two segments share the nearest point, the one that
-            // faces the point decides the side.
-            let facing = along.perp_dot(away) / square.sqrt();
-            let same = (distance - nearest).abs() <= 1e-12 * nearest;
-            if distance < nearest && !same || same && facing.abs() > f64::abs(leftward) {
-                nearest = distance;
-                leftward = facing;
+            for i in run {
+                let (from, to) = (edge[i], edge[(i + 1) % edge.len()]);
+                let along = to - from;
+                let square = along.length_squared();
+                if square == 0.0 {
+                    continue;
+                }
+                let away = point - from;
+                let share = (away.dot(along) / square).clamp(0.0, 1.0);
+                let distance = (away - share * along).length_squared();
+                let same = (distance - nearest).abs() <= SAME * nearest;
+                if !(same || distance < nearest) {
+                    continue;
+                }
+                // How nearly the point lies at right angles to the segment. Where two segments share the nearest point, the one that
+                // faces the point decides the side.
+                let facing = along.perp_dot(away) / square.sqrt();
+                if !same || facing.abs() > f64::abs(leftward) {
+                    nearest = distance;
+                    leftward = facing;
+                }
             }
         }
         let leftward = nearest.sqrt().copysign(leftward);
@@ -227,19 +294,17 @@ impl<'a> RoadEdges<'a> {
     /// Where a straight line from a point near a cross-section, in a direction of length one, meets an edge for the first time
     /// (m); nothing where it meets none.
     pub fn meets(&self, point: DVec2, way: DVec2, abreast: usize, left: bool) -> Option<f64> {
-        let edge = if left { self.left_m } else { self.right_m };
-        let near = self.around(abreast, REACH_M);
-        let meeting = |i: isize| {
-            let (from, to) = (edge[self.index(i)], edge[self.index(i + 1)]);
+        let (edge, _) = self.edge(left);
+        let meeting = |i: usize| {
+            let (from, to) = (edge[i], edge[(i + 1) % edge.len()]);
             let (along, apart) = (to - from, from - point);
             let cross = way.perp_dot(along);
             let share = apart.perp_dot(way) / cross;
             let distance = apart.perp_dot(along) / cross;
             ((-1e-9..=1.0 + 1e-9).contains(&share) && distance >= 0.0).then_some(distance)
         };
-        (*near.start()..*near.end())
-            .filter_map(meeting)
-            .min_by(f64::total_cmp)
+        let pieces = self.around(abreast, REACH_M, 1).flatten();
+        pieces.filter_map(meeting).min_by(f64::total_cmp)
     }
 
     /// Draws in the ends of cross-sections at which a car of this width (m) would be beyond an edge: where they slant, or where
@@ -319,6 +384,18 @@ mod tests {
             turned.rotate_left(start);
             let found = check_line(&fine(&turned, true), &right, &left, &car);
             assert!((found.margin_m - 4.0).abs() < 0.01, "{start}: {found:?}");
+        }
+    }
+
+    /// A point on the edge itself, and points either side of it, on a straight where all pieces lie in one line.
+    #[test]
+    fn a_point_on_the_edge_is_no_distance_from_it() {
+        let at = |y: f64| -> Vec<DVec2> { (0..40).map(|i| DVec2::new(f64::from(i), y)).collect() };
+        let (right, left) = (at(-5.0), at(5.0));
+        let edges = RoadEdges::new(&right, &left, false);
+        for (y, is_left) in [(5.0, true), (-5.0, false), (5.25, true), (-4.0, false)] {
+            let found = edges.inside(DVec2::new(20.3, y), 20, is_left);
+            assert_eq!(found, if is_left { 5.0 - y } else { y + 5.0 });
         }
     }
 

@@ -33,7 +33,7 @@ pub use kernel::{BySection, Within};
 pub use loads::LoadTables;
 pub(crate) use loads::MOST_LOAD;
 pub use parametrisation::Parametrisation;
-pub use perpendicular::{cross_sections_about, shares_across};
+pub use perpendicular::{Spread, cross_sections_about, shares_across};
 pub use plan::{LinePlan, ReliefRow, SectionRow, TERMS};
 pub use point_mass::{EnvelopeTable, PointMass, TRACTION_ROOTS, TRACTION_SPEEDS, TRACTION_WIDTH};
 pub use profile::{LapProfile, lap_profile, lap_profile_on};

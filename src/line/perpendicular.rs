@@ -100,14 +100,94 @@ pub fn shares_across(road: &CrossSections, points_m: &[DVec2]) -> Result<Vec<f64
     Ok(found.into_iter().map(|c| c.alpha).collect())
 }
 
-/// `count` cross-sections square to the closed line through `points_m`, evenly spaced along it, between the edges of `road`; the
-/// line is their reference, and may lie off the road. At the cross-sections a line within these is within `road`; between two of
-/// them an edge bulges in by no more than the square of their spacing over eight times its radius.
+/// How cross-sections are spread along a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// So many at equal steps.
+    Even(usize),
+    /// At steps of so many metres in bends, and up to so many on straights.
+    Steps {
+        /// The step in bends (m).
+        bends_m: f64,
+        /// The greatest step on straights (m).
+        straights_m: f64,
+    },
+}
+
+/// Radius (m) of bends below which steps are the least.
+const TIGHT_M: f64 = 150.0;
+/// Distance (m) over which steps change from those of straights to those of bends.
+const APPROACH_M: f64 = 40.0;
+
+impl Spread {
+    /// The stations (m) of the cross-sections along a closed curve, ascending from zero.
+    fn stations(self, curve: &FineLine) -> Vec<f64> {
+        let (bends_m, straights_m) = match self {
+            Self::Even(count) => {
+                let spacing_m = curve.length_m / count as f64;
+                return (0..count).map(|i| spacing_m * i as f64).collect();
+            }
+            Self::Steps { bends_m, straights_m } => (bends_m, straights_m),
+        };
+        // Cross-sections per metre, without kinks: a spline over the cross-sections' numbers is to be smooth in the plane.
+        let reach = (APPROACH_M / STEP_M) as usize;
+        let bends: Vec<f64> = curve.curvature_1pm.iter().map(|k| k.abs()).collect();
+        let wanted = twice_averaged(&bends, reach).into_iter();
+        let wanted: Vec<f64> = wanted
+            .map(|k| (k * TIGHT_M).clamp(bends_m / straights_m, 1.0) / bends_m)
+            .collect();
+        let density = twice_averaged(&wanted, reach);
+        let mut sums = vec![0.0];
+        for (i, step_m) in curve.segment_m.iter().enumerate() {
+            let mean = 0.5 * (density[i] + density[(i + 1) % density.len()]);
+            sums.push(sums[i] + mean * step_m);
+        }
+        let total = sums[sums.len() - 1];
+        let count = total.ceil() as usize;
+        let station = |i: usize| {
+            let wanted = total * i as f64 / count as f64;
+            let segment = sums
+                .partition_point(|sum| *sum <= wanted)
+                .clamp(1, sums.len() - 1)
+                - 1;
+            let share = (wanted - sums[segment]) / (sums[segment + 1] - sums[segment]);
+            curve.station_m[segment] + share * curve.segment_m[segment]
+        };
+        (0..count).map(station).collect()
+    }
+}
+
+/// Means over `reach` neighbours in all, taken twice, of values along a closed curve.
+fn twice_averaged(values: &[f64], reach: usize) -> Vec<f64> {
+    let n = values.len();
+    let half = (reach / 2).min((n - 1) / 2);
+    let averaged = |values: &[f64]| -> Vec<f64> {
+        let mut sum: f64 = (0..=2 * half).map(|j| values[(n + j - half) % n]).sum();
+        (0..n)
+            .map(|i| {
+                let mean = sum / (2 * half + 1) as f64;
+                sum += values[(i + half + 1) % n] - values[(i + n - half) % n];
+                mean
+            })
+            .collect()
+    };
+    averaged(&averaged(values))
+}
+
+/// Cross-sections square to the closed line through `points_m`, spread along it, between the edges of `road`; the line is their
+/// reference, and may lie off the road. At the cross-sections a line within these is within `road`; between two of them an edge
+/// bulges in by no more than the square of their spacing over eight times its radius.
 ///
 /// # Errors
 /// As [`shares_across`]; [`Error::Study`] where an edge does not lie abreast of the line.
-pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usize) -> Result<CrossSections> {
+pub fn cross_sections_about(
+    road: &CrossSections,
+    points_m: &[DVec2],
+    spread: Spread,
+) -> Result<CrossSections> {
     let curve = followed(road, points_m)?;
+    let stations = spread.stations(&curve);
+    let count = stations.len();
     let (n, k) = (road.len(), curve.points_m.len());
     let mut by_station: Vec<(f64, usize)> = crossings(road, &curve)?
         .into_iter()
@@ -115,7 +195,6 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
         .map(|(section, c)| (c.station_m, section))
         .collect();
     by_station.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let spacing_m = curve.length_m / count as f64;
     let reach = (REACH_M * n as f64 / road.length_m).ceil() as usize + 2;
     let reach = reach.min(n / 2);
     // The direction to the left at a point of the curve.
@@ -126,8 +205,7 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
 
     let mut places = Vec::with_capacity(count);
     let mut limits = Vec::with_capacity(count);
-    for i in 0..count {
-        let station_m = spacing_m * i as f64;
+    for &station_m in &stations {
         let segment = curve.station_m.partition_point(|s| *s <= station_m).max(1) - 1;
         let share = (station_m - curve.station_m[segment]) / curve.segment_m[segment];
         let left = left_at(segment).lerp(left_at(segment + 1), share).normalize();
@@ -167,8 +245,8 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
                 })
                 .unwrap_or(0);
             let inward = (end - curve.points_m[nearest]).dot(left_at(nearest));
-            let before = (curve.station_m[nearest] / spacing_m) as usize;
-            for i in [before % count, (before + 1) % count] {
+            let after = stations.partition_point(|s| *s <= curve.station_m[nearest]);
+            for i in [after - 1, after % count] {
                 let limit = &mut limits[i][side];
                 *limit = if side == 0 {
                     limit.max(inward)
@@ -181,7 +259,7 @@ pub fn cross_sections_about(road: &CrossSections, points_m: &[DVec2], count: usi
 
     let mut cross_sections = CrossSections {
         length_m: curve.length_m,
-        station_m: (0..count).map(|i| spacing_m * i as f64).collect(),
+        station_m: stations,
         right_m: Vec::with_capacity(count),
         left_m: Vec::with_capacity(count),
         reference: Vec::with_capacity(count),
@@ -217,7 +295,7 @@ mod tests {
         let ring = Shape::parse("circle:90:110").unwrap().unwrap();
         let road = ring.cross_sections(400).unwrap();
         let points = road.points(&vec![0.3; 400]);
-        let cross_sections = cross_sections_about(&road, &points, 300).unwrap();
+        let cross_sections = cross_sections_about(&road, &points, Spread::Even(300)).unwrap();
         for i in 0..300 {
             let radii = [cross_sections.right_m[i], cross_sections.left_m[i]].map(DVec2::length);
             // Polygons of 400 corners: a sagitta is 3.4 mm.
@@ -240,11 +318,40 @@ mod tests {
 
     /// On a circuit with hairpins every line within the new cross-sections is within the old ones, but for what it bulges between
     /// two.
+    /// Two straights of 400 m and half circles of 60 m: least steps in bends, three times as long ones on straights, and none that is
+    /// much longer than the one before.
+    #[test]
+    fn steps_are_closer_in_bends() {
+        let stadium = Shape::parse("stadium:400:60:12").unwrap().unwrap();
+        let road = stadium.cross_sections(600).unwrap();
+        let spread = Spread::Steps {
+            bends_m: 2.0,
+            straights_m: 6.0,
+        };
+        let points = road.points(&road.reference);
+        let cross_sections = cross_sections_about(&road, &points, spread).unwrap();
+        let steps = cross_sections.spacing_m();
+        let least = steps.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = steps.iter().copied().fold(0.0, f64::max);
+        assert!((1.95..2.0 + 1e-9).contains(&least), "{least}");
+        assert!((5.8..6.0 + 1e-9).contains(&most), "{most}");
+        let next = steps.iter().skip(1).chain(&steps[..1]);
+        let growth = steps.iter().zip(next).map(|(step, next)| next / step);
+        assert!(
+            growth.clone().all(|g| (0.75..1.35).contains(&g)),
+            "{:?}",
+            growth.collect::<Vec<_>>()
+        );
+        let length_m: f64 = steps.iter().sum();
+        assert!((length_m / road.length_m - 1.0).abs() < 1e-3, "{length_m}");
+    }
+
     #[test]
     fn lines_within_are_on_the_road() {
         let track = Track::load("silverstone_gp").unwrap();
         let road = track.cross_sections(720, false).unwrap();
-        let cross_sections = cross_sections_about(&road, &road.points(&road.reference), 1440).unwrap();
+        let cross_sections =
+            cross_sections_about(&road, &road.points(&road.reference), Spread::Even(1440)).unwrap();
         for alpha in [0.0, 0.5, 1.0] {
             let shares = shares_across(&road, &cross_sections.points(&vec![alpha; 1440])).unwrap();
             let worst = shares.iter().fold(0.0f64, |w, a| w.max((a - 0.5).abs() - 0.5));
@@ -259,7 +366,9 @@ mod tests {
         let mut road = track.cross_sections(120, false).unwrap();
         let points = road.points(&road.reference);
         road.closed = false;
-        let error = cross_sections_about(&road, &points, 100).unwrap_err().to_string();
+        let error = cross_sections_about(&road, &points, Spread::Even(100))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("closed"), "{error}");
     }
 }

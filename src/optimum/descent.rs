@@ -157,18 +157,23 @@ pub fn descend(
             .zip(&solution.x)
             .zip(bounds.lower.iter().zip(&bounds.upper));
         let trial: Vec<f64> = moved.map(|((x, d), (l, u))| (x + d).clamp(*l, *u)).collect();
-        let there = judge.place(trial);
-        let gain = here.cost - there.cost;
-        if !failed && gain >= LEAST_KEPT * promise {
-            here = there;
-            judging = false;
-            if gain >= WELL_KEPT * promise {
-                caution *= CAUTION.1;
-            }
-        } else if judging {
-            // Where all of the step loses, its parts say whether the line can be bettered that way.
+        let mut there = judge.place(trial);
+        let whole = here.cost - there.cost;
+        let well_kept = !failed && whole >= WELL_KEPT * promise;
+        let kept = !failed && whole >= LEAST_KEPT * promise;
+        // Where the whole step loses what its model leaves out, parts of it may gain: they cost nothing beside a program.
+        if !failed && !kept {
             let part = here.part_of(&judge, &there.x);
-            let gained = (here.cost - part.cost) / here.cost.abs();
+            if part.cost < there.cost {
+                there = part;
+            }
+        }
+        let gain = here.cost - there.cost;
+        let gained = gain / here.cost.abs();
+        if !failed && gain > 0.0 {
+            here = there;
+        }
+        if judging && !kept {
             status = if gained <= settings.least_gain.max(JUDGED_GAIN) {
                 solution.status
             } else {
@@ -176,11 +181,12 @@ pub fn descend(
                     "a part of the last step still gained {gained:.1e} of the cost"
                 ))
             };
-            if gained > 0.0 {
-                here = part;
-            }
             break;
-        } else {
+        }
+        judging = false;
+        if well_kept {
+            caution *= CAUTION.1;
+        } else if !kept {
             caution *= CAUTION.0;
         }
         if caution > MOST_CAUTION {

@@ -192,16 +192,15 @@ impl LineMap {
     }
 }
 
-/// Weights of `controls` evenly spaced controls of a cubic B-spline at cross-section `i`. On an open circuit the outer controls
-/// also stand for those that would lie beyond the ends.
+/// Weights of `controls` controls of a cubic B-spline at cross-section `i`: the controls are as many cross-sections apart all along.
+/// On an open circuit the outer controls also stand for those that would lie beyond the ends.
 fn spline_shares(cross_sections: &CrossSections, controls: usize, i: usize) -> Vec<(usize, f64)> {
-    let last = controls as isize - 1;
-    let spans = if cross_sections.closed {
-        controls as f64
+    let (n, last) = (cross_sections.len(), controls as isize - 1);
+    let place = if cross_sections.closed {
+        (i * controls) as f64 / n as f64
     } else {
-        last as f64
+        i as f64 * last as f64 / (n - 1) as f64
     };
-    let place = cross_sections.station_m[i] / cross_sections.length_m * spans;
     let t = place - place.floor();
     let weights = [
         (1.0 - t).powi(3) / 6.0,

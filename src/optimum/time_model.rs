@@ -12,6 +12,8 @@ const NEAR_CORNER: f64 = 0.5;
 /// Shares of the lateral and the longitudinal grip by which steps may come closer to the limit of the driven tyres. Where the car is
 /// farther from it, a step does without it, and its program takes half as long.
 const NEAR: f64 = 0.1;
+/// Share of the ellipse below which tangents stand in for it: that at full braking, which a step could reach, and that of the drive.
+const FAR: f64 = 0.65;
 
 /// Adds the time, times `weight`, of `lap` to a program whose variables so far are changes of the line's; relative changes of the
 /// squared speeds follow them. Tyres are held within the ellipse at the middle of each segment with the curvature that it is
@@ -155,28 +157,39 @@ fn add_segment(
         for (end, share) in ends {
             shape.add_curvature(map, end, share * middle / across, &mut change);
         }
-        // A segment may lie slightly beyond the ellipse, by rounding or because the car coasts through its middle. It may stay
-        // there.
-        let whole = affine(longitudinal.constant.hypot(used).max(1.0), Vec::new());
         let across = affine(used, change);
-        program.add_cone([whole, longitudinal.clone(), across.clone()]);
+        let far = longitudinal.constant.hypot(used) < FAR;
+        if far {
+            program.add_nonnegative(affine(1.0 + longitudinal.constant, longitudinal.terms.clone()));
+        } else {
+            // A segment may lie slightly beyond the ellipse, by rounding or because the car coasts through its middle. It may
+            // stay there.
+            let whole = affine(longitudinal.constant.hypot(used).max(1.0), Vec::new());
+            program.add_cone([whole, longitudinal.clone(), across.clone()]);
+        }
         // Driven tyres have less. What they have is linear in the root of what the lateral share leaves, which is a variable below
-        // a circle.
+        // a circle; far from it, the circle's tangent will do.
         let root = root_left(used);
         let closer = root_left((used.abs() + NEAR).min(1.0));
         let least = envelope.traction(v, closer).map_or(along * closer, |t| t.value);
         let traction = envelope.traction(v, root);
         if let Some(traction) = traction.filter(|_| least < demand + NEAR * along) {
-            // The cone holds it below 1, and nothing gains by less than zero.
-            let left = program.add_variables(std::iter::once((f64::NEG_INFINITY, f64::INFINITY)));
-            let whole = affine(used.abs().max(1.0), Vec::new());
-            program.add_cone([whole, affine(0.0, vec![(left, 1.0)]), across]);
             let slope = 0.5 * per_square * (traction.by_speed - grip.drag.by_speed) / along;
             let by_root = traction.by_root / along;
             let mut change = terms(slope + 0.5 / (h * along), slope - 0.5 / (h * along), -by_length);
-            change.push((left, by_root));
             let spare = ((traction.value - demand) / along).max(0.0);
-            program.add_nonnegative(affine(spare - by_root * root, change));
+            if far {
+                let tangent = -by_root * used / root;
+                change.extend(across.terms.iter().map(|&(k, a)| (k, tangent * a)));
+                program.add_nonnegative(affine(spare, change));
+            } else {
+                // The cone holds it below 1, and nothing gains by less than zero.
+                let left = program.add_variables(std::iter::once((f64::NEG_INFINITY, f64::INFINITY)));
+                let whole = affine(used.abs().max(1.0), Vec::new());
+                program.add_cone([whole, affine(0.0, vec![(left, 1.0)]), across]);
+                change.push((left, by_root));
+                program.add_nonnegative(affine(spare - by_root * root, change));
+            }
         }
     }
     let slope = 0.5 * per_square * (grip.drive.by_speed - grip.drag.by_speed) / along;

@@ -357,9 +357,13 @@ fn guess(role: Role, recording: &Recording) -> Option<&Channel> {
             .map(|c| c.to_ascii_lowercase())
             .collect()
     };
+    let called = |name: &str| recording.channels.iter().find(|c| key(&c.name) == name);
+    let fits = |c: &&Channel| check_unit(&c.unit, role).is_ok();
+    let mut with_unit = role.names_with_unit().iter();
     role.usual_names()
         .iter()
-        .find_map(|usual| recording.channels.iter().find(|c| key(&c.name) == *usual))
+        .find_map(|name| called(name))
+        .or_else(|| with_unit.find_map(|name| called(name).filter(fits)))
 }
 
 /// The names of a recording's channels, for messages.
@@ -482,12 +486,37 @@ mod tests {
     fn no_usual_name_is_that_of_two_roles() {
         let mut names: Vec<&str> = Role::ALL
             .iter()
-            .flat_map(|role| role.usual_names())
+            .flat_map(|role| role.usual_names().iter().chain(role.names_with_unit()))
             .copied()
             .collect();
         names.sort_unstable();
         let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
         assert_eq!(twice, None);
+    }
+
+    /// A wheel's name is that of its speed, if the unit is that of a speed.
+    #[test]
+    fn names_of_other_quantities_are_found_by_their_units() {
+        let named = |channels: &[(&str, &str)]| -> Vec<Role> {
+            let recording = recording(channels);
+            let found = |role: &Role| ChannelMap::default().find(*role, &recording).unwrap().is_some();
+            Role::ALL.into_iter().filter(found).collect()
+        };
+        let speeds = [
+            ("Wheel FL", "km/h"),
+            ("RF Wheel", "rpm"),
+            ("Yaw", "deg/s"),
+            ("Lateral", "g"),
+        ];
+        let roles = [Role::WheelSpeedFl, Role::WheelSpeedFr, Role::Ay, Role::YawRate];
+        assert_eq!(named(&speeds), roles);
+        let others = [
+            ("Wheel FL", "C"),
+            ("RF Wheel", "bar"),
+            ("Yaw", "deg"),
+            ("Lateral", "m"),
+        ];
+        assert_eq!(named(&others), []);
     }
 
     /// A logger's short names.

@@ -4,6 +4,37 @@ use serde::{Deserialize, Serialize};
 
 use super::units::Quantity;
 
+/// Usual names of the speed of a wheel, whose place is called so.
+macro_rules! wheel_speeds {
+    ($($place:literal),+) => {
+        &[$(
+            concat!("wheelspeed", $place, "radps"),
+            concat!("wheelspeed", $place),
+            concat!($place, "wheelspeed"),
+            concat!("wheelspd", $place),
+            concat!($place, "wheelspd"),
+            concat!("whlspd", $place),
+            concat!("wspeed", $place),
+            concat!("wspd", $place),
+            concat!("speed", $place),
+            concat!($place, "speed"),
+            concat!("ws", $place),
+        )+]
+    };
+}
+
+/// Names of a wheel, whose place is called so.
+macro_rules! wheels {
+    ($($place:literal),+) => {
+        &[$(
+            concat!("wheel", $place),
+            concat!($place, "wheel"),
+            concat!("omega", $place),
+            concat!("v", $place),
+        )+]
+    };
+}
+
 /// The role of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -166,63 +197,10 @@ impl Role {
     /// MoTeC, AiM, Racelogic, RaceChrono and iRacing.
     pub(super) fn usual_names(self) -> &'static [&'static str] {
         match self {
-            Self::WheelSpeedFl => &[
-                "wheelspeedflradps",
-                "wheelspeedfl",
-                "wheelspeedfrontleft",
-                "wheelspdfl",
-                "whlspdfl",
-                "wspeedfl",
-                "speedfl",
-                "flwheelspeed",
-                "flspeed",
-                "lfspeed",
-                "wsfl",
-                "wslf",
-                "lfwheelspeed",
-            ],
-            Self::WheelSpeedFr => &[
-                "wheelspeedfrradps",
-                "wheelspeedfr",
-                "wheelspeedfrontright",
-                "wheelspdfr",
-                "whlspdfr",
-                "wspeedfr",
-                "speedfr",
-                "frwheelspeed",
-                "frspeed",
-                "rfspeed",
-                "wsfr",
-                "wsrf",
-                "rfwheelspeed",
-            ],
-            Self::WheelSpeedRl => &[
-                "wheelspeedrlradps",
-                "wheelspeedrl",
-                "wheelspeedrearleft",
-                "wheelspdrl",
-                "whlspdrl",
-                "wspeedrl",
-                "speedrl",
-                "rlwheelspeed",
-                "rlspeed",
-                "lrspeed",
-                "wsrl",
-                "wslr",
-                "lrwheelspeed",
-            ],
-            Self::WheelSpeedRr => &[
-                "wheelspeedrrradps",
-                "wheelspeedrr",
-                "wheelspeedrearright",
-                "wheelspdrr",
-                "whlspdrr",
-                "wspeedrr",
-                "speedrr",
-                "rrwheelspeed",
-                "rrspeed",
-                "wsrr",
-            ],
+            Self::WheelSpeedFl => wheel_speeds!("fl", "lf", "frontleft", "leftfront"),
+            Self::WheelSpeedFr => wheel_speeds!("fr", "rf", "frontright", "rightfront"),
+            Self::WheelSpeedRl => wheel_speeds!("rl", "lr", "rearleft", "leftrear"),
+            Self::WheelSpeedRr => wheel_speeds!("rr", "rearright", "rightrear"),
             Self::Steer => &[
                 "steerrad",
                 "steeredangle",
@@ -347,6 +325,22 @@ impl Role {
             ],
             Self::X => &["xm", "posx", "positionx", "xposition", "carposx", "x"],
             Self::Y => &["ym", "posy", "positiony", "yposition", "carposy", "y"],
+        }
+    }
+    /// Names that are also given to other quantities, written as the usual ones: a channel of such a name plays the role only if
+    /// its unit is one of the role's.
+    pub(super) fn names_with_unit(self) -> &'static [&'static str] {
+        match self {
+            Self::WheelSpeedFl => wheels!("fl", "lf", "frontleft", "leftfront"),
+            Self::WheelSpeedFr => wheels!("fr", "rf", "frontright", "rightfront"),
+            Self::WheelSpeedRl => wheels!("rl", "lr", "rearleft", "leftrear"),
+            Self::WheelSpeedRr => wheels!("rr", "rearright", "rightrear"),
+            Self::Steer => &["handwheel", "roadwheelangle", "swangle"],
+            Self::Vx => &["vel", "velocityx", "longitudinalvelocity", "gpsvelocity", "v"],
+            Self::Ax => &["longitudinal", "inline"],
+            Self::Ay => &["lateral"],
+            Self::YawRate => &["yaw", "rotationz", "angularvelocityz", "omegaz", "wz"],
+            _ => &[],
         }
     }
 }

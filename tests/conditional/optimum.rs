@@ -1,7 +1,7 @@
 //! Exact optima of racing lines, against closed forms, against chance, and on a surveyed circuit.
 
 use crate::common::harness::survey;
-use lapswarm::line::{FineLine, Parametrisation, PointMass, cross_sections_about};
+use lapswarm::line::{FineLine, Parametrisation, PointMass, Spread, cross_sections_about};
 use lapswarm::optimum::{
     Bounds, DescentSettings, LineMap, Optimum, PointMassEnvelope, ReferenceProblem, SegmentBend, Start,
     Status, Weights, descend, fastest, least_gamma, least_squared_length, minimum_curvature, polish_lines,
@@ -457,7 +457,7 @@ fn every_start_ends_at_the_same_lap_of_the_surveyed_silverstone() {
         fine.lap_time_s().unwrap()
     };
     let about = |points: &[glam::DVec2], count: usize, bend: SegmentBend| {
-        let cross_sections = cross_sections_about(&cross_sections, points, count).unwrap();
+        let cross_sections = cross_sections_about(&cross_sections, points, Spread::Even(count)).unwrap();
         let (map, bounds) = LineMap::spline_about(&cross_sections, &cross_sections.reference, count / 3);
         let problem = ReferenceProblem {
             envelope: Some(&envelope),

@@ -4,7 +4,7 @@ use crate::common::harness::survey;
 use lapswarm::config::settings::Settings;
 use lapswarm::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use lapswarm::evaluate::{BackendChoice, Evaluator};
-use lapswarm::line::{FineLine, Parametrisation, cross_sections_about};
+use lapswarm::line::{FineLine, Parametrisation, Spread, cross_sections_about};
 use lapswarm::optimum::{
     DescentSettings, LineMap, PointMassEnvelope, ReferenceProblem, ReferenceSolvers, fastest,
 };
@@ -97,7 +97,7 @@ fn minimum_time_s(setup: &Setup, alpha: &[f64]) -> f64 {
     let envelope = PointMassEnvelope::new(&setup.car).unwrap();
     let mut points = setup.cross_sections.points(alpha);
     for count in [1962, 2943, 5886] {
-        let about = cross_sections_about(&setup.cross_sections, &points, count).unwrap();
+        let about = cross_sections_about(&setup.cross_sections, &points, Spread::Even(count)).unwrap();
         let (map, bounds) = LineMap::spline_about(&about, &about.reference, count / 3);
         let problem = ReferenceProblem {
             envelope: Some(&envelope),

@@ -409,7 +409,7 @@ fn refused_input_leaves_nothing_in_the_way() {
         vec!["surface", "--section", "Abbey", "--parameters", "K,K"],
         vec!["sweep", "sweep.toml"],
         vec!["sweep", "few.toml"],
-        vec!["reproduce", "--chapter", "4"],
+        vec!["reproduce", "--chapter", "1"],
         vec![
             "reproduce",
             "--adapter",

@@ -306,9 +306,8 @@ fn the_swarm_comes_within_hundredths_of_a_second_of_the_exact_deployment() {
     let setup = &set_up(&settings).unwrap();
     let engine = drive(setup, "engine", Mode::Additional, NO_MOTOR).unwrap();
     let mut before = engine.lap.time;
-    // Measured are 0.015, 0.0001 and 0.0000 s (the less energy, the more it matters where it goes): less than twice the first, and
-    // no less than what the exact deployment is held to.
-    for (mj, above_s) in [(1.0, 0.025), (2.1, 2e-3), (5.3, 2e-3)] {
+    // Measured are 0.0001 s and less: no less than what the exact deployment is held to.
+    for mj in [1.0, 2.1, 5.3] {
         let exact = setup.exact(1e6 * mj, None).unwrap();
         let swarm = search_strategy(
             setup,
@@ -324,7 +323,7 @@ fn the_swarm_comes_within_hundredths_of_a_second_of_the_exact_deployment() {
             exact.lap.time, exact.bound_s
         );
         assert!(
-            time < exact.lap.time + above_s,
+            time < exact.lap.time + 2e-3,
             "{mj} MJ: {time} s and {} s",
             exact.lap.time
         );
@@ -413,9 +412,9 @@ fn stints_sustain_their_charge_and_sizes_meet_their_lap() {
     for row in &sized {
         // False position ends within 3 ms, or after eight energies, whose searches leave some thousandths to chance.
         assert!((row.lap_time_s - goal).abs() < 0.01, "{row:?}");
-        // As near to the exact deployment of the same motor and energy as the swarm for the car's own motor has to be.
+        // Measured are 0.0003 to 0.0048 s above the exact deployment of the same motor and energy, and 0.014 s with the least motor.
         assert!(
-            (row.lap_time_s - row.exact_lap_time_s.unwrap()).abs() < 0.05,
+            (row.lap_time_s - row.exact_lap_time_s.unwrap()).abs() < 0.02,
             "{row:?}"
         );
         assert!(

@@ -21,6 +21,5 @@ pub use manifest::{Manifest, write_json, write_study};
 pub use plan::Plan;
 pub use record::RunRecord;
 pub(in crate::study) use record::Watch;
-pub(in crate::study) use study::add_numbers;
 pub use study::{AnyStudy, Entry, Figures, Head, Progress, Searched, Solved, State, Study, Subject, Work};
 pub use tyres::{tyre_view, with_tyres};

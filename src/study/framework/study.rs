@@ -326,7 +326,7 @@ pub struct Head {
 const CLOCK: [&str; 3] = ["elapsed_s", "_per_s", "dispatch_ms"];
 
 /// Adds the numbers of a JSON value, those within objects by dotted names.
-pub(in crate::study) fn add_numbers(figures: &mut Figures, place: &str, value: &serde_json::Value) {
+fn add_numbers(figures: &mut Figures, place: &str, value: &serde_json::Value) {
     match value {
         serde_json::Value::Object(entries) => {
             for (key, value) in entries {

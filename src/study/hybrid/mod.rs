@@ -12,6 +12,7 @@ mod settings;
 mod setup;
 mod sizing;
 mod solve;
+mod spending;
 mod stint;
 mod strategy;
 

@@ -3,6 +3,7 @@
 use super::scenario::{ReportedLap, drive, drive_engine_alone};
 use super::settings::HybridStudySettings;
 use super::setup::HybridSetup;
+use super::spending::{Sharing, Spending};
 use super::strategy::MOST_MJ;
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{Free, HybridObjective, HybridProblem, open_hybrid_evaluator};
@@ -145,7 +146,7 @@ pub fn size(
             let motor = &mut problem.problem.variables[MOTOR];
             [motor.lower, motor.upper] = bounds_kw;
             let (population, seed) = (settings.population, settings.seed.wrapping_add(range as u64));
-            let mut swarm: Box<dyn Optimiser> = if round == 0 {
+            let swarm: Box<dyn Optimiser> = if round == 0 {
                 Box::new(HybridSwarm::new(
                     &problem.problem,
                     HybridSettings {
@@ -168,9 +169,11 @@ pub fn size(
                     },
                 )?)
             };
+            let spending = Spending::of(setup, &problem, energy_mj, Some(bounds_kw[1]))?;
+            let mut swarm = Sharing { swarm, spending };
             let mut evaluator =
                 open_hybrid_evaluator(&problem, settings.backend, settings.adapter.as_deref())?;
-            run(swarm.as_mut(), &mut recorder.over(evaluator.as_mut()), |p| {
+            run(&mut swarm, &mut recorder.over(evaluator.as_mut()), |p| {
                 let flow = observe(&Progress {
                     evaluations: evaluations + p.evaluations,
                     ..p.clone()

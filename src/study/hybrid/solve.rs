@@ -109,11 +109,11 @@ pub(super) fn deploy(work: Work<'_, Hybrid>) -> Result<Option<Outcome>> {
             swarm_front = Some(found);
         }
         let mut further = Vec::new();
-        for (name, problem) in setup.further_searches(settings, energy_mj)? {
+        for (name, problem, spending) in setup.further_searches(settings, energy_mj)? {
             if interrupted.get() {
                 break;
             }
-            let found = search((name, &problem), settings, &mut recorder, |p| {
+            let found = search((name, &problem), spending, settings, &mut recorder, |p| {
                 add_failures(&mut record.failures, &p.failures);
                 tell(name, p.evaluations, format!("{:.4}", p.best[0]))
             })?;

@@ -5,6 +5,7 @@ use super::settings::{
     ADDITIONAL_GATES, FreePart, HybridAlgorithm, HybridStudySettings, OFFSET_GATES, OFFSET_ZONES,
 };
 use super::setup::{HybridSetup, control_points};
+use super::spending::{Sharing, Spending};
 use crate::error::Result;
 use crate::evaluate::energy::{
     Free, HybridLine, HybridObjective, HybridProblem, Strategy, open_hybrid_evaluator,
@@ -105,11 +106,12 @@ impl HybridSetup {
         &self,
         settings: &HybridStudySettings,
         energy_mj: f64,
-    ) -> Result<Vec<(&'static str, HybridProblem)>> {
+    ) -> Result<Vec<(&'static str, HybridProblem, Option<Spending>)>> {
         let mut problems = Vec::new();
         if settings.offset {
             let problem = self.zones_of(Mode::Offset, &[], energy_mj, &[HybridObjective::Fuel])?;
-            problems.push((OFFSET_ZONES, problem));
+            let spending = Spending::of(self, &problem, energy_mj, None)?;
+            problems.push((OFFSET_ZONES, problem, Some(spending)));
         }
         if settings.gates.is_empty() {
             return Ok(problems);
@@ -127,7 +129,7 @@ impl HybridSetup {
                 ..Strategy::fixed(gates, 1)
             };
             let plan = EnergyPlan::whole(self.points_m.len(), self.run_in, mode);
-            problems.push((name, self.problem(plan, strategy, &[objective])?));
+            problems.push((name, self.problem(plan, strategy, &[objective])?, None));
         }
         Ok(problems)
     }
@@ -145,15 +147,17 @@ pub fn search_strategy(
     observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
     let problem = setup.zone_problem(&[], energy_mj, &[HybridObjective::LapTime])?;
-    search(("swarm", &problem), settings, recorder, observe)
+    let spending = Spending::of(setup, &problem, energy_mj, None)?;
+    search(("swarm", &problem), Some(spending), settings, recorder, observe)
 }
 
-/// The swarm's strategy for a problem with one objective, and the name of its lap.
+/// The swarm's strategy for a problem with one objective, and the name of its lap; by weights of zones, if it is known what these spend.
 ///
 /// # Errors
 /// Those of the evaluator.
 pub(super) fn search(
     (name, problem): (&str, &HybridProblem),
+    spending: Option<Spending>,
     settings: &HybridStudySettings,
     recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
@@ -173,7 +177,11 @@ pub(super) fn search(
             seed: settings.seed,
             ..HybridSettings::default()
         };
-        Box::new(HybridSwarm::new(&problem.problem, best)?)
+        let swarm = HybridSwarm::new(&problem.problem, best)?;
+        match spending {
+            Some(spending) => Box::new(Sharing { swarm, spending }),
+            None => Box::new(swarm),
+        }
     };
     let mut evaluator = open_hybrid_evaluator(problem, settings.backend, settings.adapter.as_deref())?;
     let (began, mut reached) = (Instant::now(), Vec::new());

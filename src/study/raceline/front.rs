@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, DeviceFaults, Evaluator, FailureCounts, Losses};
 use crate::line::Parametrisation;
-use crate::optimum::{ReferenceSolvers, interruptible};
+use crate::optimum::{ReferenceSolvers, WeightedLine, interruptible};
 use crate::random::Random;
 use crate::swarm::metrics::{Scale, hypervolume};
 use crate::swarm::{Archive, Optimiser, Progress, Reached, SwarmAtWork, SwarmState, Truncation, lattice};
@@ -46,9 +46,11 @@ const BLEND_SPREAD: f64 = 0.01;
 /// Steps from one known line to another among the lines between them that are offered to the front.
 const BLENDS: u32 = 10;
 /// Steps between the objectives of the local search: `LATTICE` and the number of objectives give its lines.
-const LATTICE: u32 = 5;
-/// Cone programs for each line of the local search: most of the gain is in the first.
-const PROGRAMS: usize = 6;
+const LATTICE: u32 = 6;
+/// Waves in which they are led downhill, and cone programs for each line. Six programs in one wave over five steps take a fifth more time
+/// for a hypervolume that is 0.2 to 1.3 % less on three circuits.
+const WAVES: usize = 2;
+const PROGRAMS: usize = 3;
 
 /// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cross-section). `begun` is the swarm of the same
 /// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told of
@@ -120,12 +122,17 @@ pub(super) fn search_front(
     let mut evaluations = swarm.evaluations();
     evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
     if settings.searches_locally() && settings.objectives.iter().all(|o| solvers.solves(*o)) {
-        let polished = std::thread::scope(|scope| {
-            let led = scope.spawn(|| polish_along(&archive, settings, solvers));
-            interruptible(led, solvers.flag(), || observe(&latest, &mut || state.clone()))
-        })?;
-        let polished = on_road(setup, settings, &polished)?;
-        evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
+        // Lines between others start from what these came to.
+        let weights = lattice(settings.objectives.len(), LATTICE);
+        for wave in 0..WAVES {
+            let starts = starts_along(&archive, weights.iter().skip(wave).step_by(WAVES), settings);
+            let polished = std::thread::scope(|scope| {
+                let led = scope.spawn(|| solvers.polish(starts, PROGRAMS));
+                interruptible(led, solvers.flag(), || observe(&latest, &mut || state.clone()))
+            })?;
+            let polished = on_road(setup, settings, &polished)?;
+            evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
+        }
     }
 
     // The point that the reference line and the edges of the archive do not exceed.
@@ -241,37 +248,33 @@ fn insert_all(archive: &mut Archive, judge: &mut dyn Evaluator, lines: &[Vec<f64
     Ok(lines.len() as u64)
 }
 
-/// The local search from the members of the archive that suit an even lattice of weights best.
-fn polish_along(
+/// The members of the archive that suit these weights best, to be led downhill by them.
+fn starts_along<'a>(
     archive: &Archive,
+    weights: impl Iterator<Item = &'a Vec<f64>>,
     settings: &RacelineSettings,
-    solvers: &ReferenceSolvers,
-) -> Result<Vec<Vec<f64>>> {
+) -> Vec<WeightedLine> {
     let m = settings.objectives.len();
     let rows = &archive.objectives;
     if rows.is_empty() {
-        return Ok(Vec::new());
+        return Vec::new();
     }
     let bound = |k: usize, f: fn(f64, f64) -> f64| rows.iter().map(|r| r[k]).reduce(f).unwrap_or(0.0);
     let ranges: Vec<f64> = (0..m)
         .map(|k| (bound(k, f64::max) - bound(k, f64::min)).max(1e-9 * bound(k, f64::max).abs()))
         .collect();
-    let starts = lattice(m, LATTICE)
-        .into_iter()
-        .map(|shares| {
-            // A trace of every objective keeps the corners of the front from being weakly best only.
-            let weight = |k: usize| (shares[k] + 0.002) / ranges[k];
-            let sum = |row: &[f64]| (0..m).map(|k| weight(k) * row[k]).sum::<f64>();
-            let best = (0..rows.len())
-                .min_by(|&i, &j| sum(&rows[i]).total_cmp(&sum(&rows[j])))
-                .unwrap_or(0);
-            let terms = settings
-                .objectives
-                .iter()
-                .enumerate()
-                .map(|(k, o)| (*o, weight(k)));
-            (archive.positions[best].clone(), terms.collect())
-        })
-        .collect();
-    solvers.polish(starts, PROGRAMS)
+    let start = |shares: &Vec<f64>| {
+        // A trace of every objective keeps the corners of the front from being weakly best only.
+        let weight = |k: usize| (shares[k] + 0.002) / ranges[k];
+        let sum = |row: &[f64]| (0..m).map(|k| weight(k) * row[k]).sum::<f64>();
+        let best = (0..rows.len())
+            .min_by(|&i, &j| sum(&rows[i]).total_cmp(&sum(&rows[j])))
+            .unwrap_or(0);
+        let terms = settings.objectives.iter().enumerate();
+        (
+            archive.positions[best].clone(),
+            terms.map(|(k, o)| (*o, weight(k))).collect(),
+        )
+    };
+    weights.map(start).collect()
 }

@@ -7,7 +7,7 @@ use super::whole_line_search::search_whole_lines;
 use super::window_search::{FoundLine, LevelRow, LineSearch, LineSearchSettings, search_line};
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
-use crate::line::{cross_sections_about, shares_across};
+use crate::line::{Spread, cross_sections_about, shares_across};
 use crate::optimum::within_road;
 use crate::study::framework::Progress;
 
@@ -92,7 +92,7 @@ pub(super) fn search_objective(
     }
     // Open roads, and what folds over itself, cannot be cut square to lines on it.
     let road = &setup.cross_sections;
-    if cross_sections_about(road, &road.points(&road.reference), setup.cross_sections.len()).is_ok() {
+    if cross_sections_about(road, &road.points(&road.reference), Spread::Even(road.len())).is_ok() {
         search_about(settings, setup, &search, &plain, work)
     } else {
         search_across(settings, setup, &search, &plain, work)
@@ -155,7 +155,8 @@ fn search_about(
         let wave_m = stage.wave * road.length_m / controls as f64;
         let smooth = cross_sections.points(&cross_sections.smoothed(&line, wave_m));
         // Where the line has come to fold the cross-sections, what has been found so far is the answer.
-        let Ok(about) = cross_sections_about(road, &smooth, controls * SECTIONS_PER_CONTROL) else {
+        let Ok(about) = cross_sections_about(road, &smooth, Spread::Even(controls * SECTIONS_PER_CONTROL))
+        else {
             break;
         };
         cross_sections = about;

@@ -14,9 +14,7 @@ use crate::config::read_text;
 use crate::error::{Error, Result};
 use crate::files::run_folder::{MANIFEST, SETTINGS, STATE, SUMMARY};
 use crate::report::write_whole;
-use crate::study::framework::{
-    Answer, Figures, Progress, Request, TIME_LIMIT, TimeLimit, add_numbers, write_json,
-};
+use crate::study::framework::{Answer, Figures, Progress, Request, TIME_LIMIT, TimeLimit, write_json};
 use crate::study::registry::Registered;
 use crate::study::sweep::{self, KeptRow, Row, RowsRequest, SWEEP_FILE, SweepSettings};
 use cpu_time::ProcessTime;
@@ -168,7 +166,7 @@ pub fn reproduce(
                 observe: &mut told,
             };
             match item.task(settings.quick, &settings.on)? {
-                Task::Study(study, text) => at_work.study(study, &text),
+                Task::Study(study, text) => at_work.study(study, &text, &item.figures),
                 Task::Sweep(sweep) => at_work.sweep(&sweep),
             }
         };
@@ -223,7 +221,12 @@ struct AtWork<'a> {
 
 impl AtWork<'_> {
     /// One run with its own page, unless it is there.
-    fn study(&mut self, study: &'static dyn Registered, text: &str) -> Result<Done> {
+    fn study(
+        &mut self,
+        study: &'static dyn Registered,
+        text: &str,
+        asked: &[chapter::Asked],
+    ) -> Result<Done> {
         let found = self.folder.join(MANIFEST).is_file() && !self.folder.join(STATE).is_file();
         let mut failed = Vec::new();
         if !found {
@@ -257,9 +260,20 @@ impl AtWork<'_> {
         let path = self.folder.join(SUMMARY);
         let summary: serde_json::Value = serde_json::from_str(&read_text(&path)?)
             .map_err(|e| Error::input(&path, "contents", e.to_string(), "the summary of a study"))?;
-        let mut figures = Figures::new();
-        add_numbers(&mut figures, "", &summary);
-        figures.insert("elapsed_s".to_owned(), summary["elapsed_s"].as_f64());
+        let at = |key: &str| {
+            let found = key
+                .split('.')
+                .try_fold(&summary, |within, part| match part.parse::<usize>() {
+                    Ok(place) if within.is_array() => within.get(place),
+                    _ => within.get(part),
+                });
+            found.and_then(serde_json::Value::as_f64)
+        };
+        let keys = asked.iter().map(|asked| asked.figure.as_str());
+        let known = keys
+            .chain(["evaluations"])
+            .filter_map(|key| Some((key, at(key)?)));
+        let figures: Figures = known.map(|(key, v)| (key.to_owned(), Some(v))).collect();
         let row = Row {
             figures,
             ..Row::default()

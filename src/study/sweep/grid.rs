@@ -50,6 +50,8 @@ const BUNDLED: [(&str, &str); 6] = bundled!(
 const MOST_RUNS: usize = 100_000;
 /// Most bytes of all studies together.
 const MOST_TEXT: usize = 256 << 20;
+/// The axis whose values are tables of keys that change together.
+const TOGETHER: &str = "together";
 /// Most tables within tables that a key of the grid goes through.
 const MOST_DOTS: usize = 8;
 impl SweepSettings {
@@ -106,6 +108,17 @@ impl SweepSettings {
             _ if key.matches('.').count() > MOST_DOTS => {
                 let key: String = key.chars().take(60).collect();
                 Err(refuse("grid", key, "keys that go through a few tables at most"))
+            }
+            Value::Array(values) if key == TOGETHER && values.iter().any(|v| !v.is_table()) => {
+                let found = values
+                    .iter()
+                    .find(|v| !v.is_table())
+                    .map_or(String::new(), Value::to_string);
+                Err(refuse(
+                    "grid, together",
+                    found,
+                    "tables of the study's keys, as { a = 1, b = 2 }",
+                ))
             }
             Value::Array(values) if !values.is_empty() => Ok((key, values)),
             other => {
@@ -182,7 +195,12 @@ impl SweepSettings {
                 }
                 let mut study = self.base.clone();
                 for (key, value) in chosen.iter().rev() {
-                    self.set(&mut study, key, value)?;
+                    match value {
+                        Value::Table(keys) if *key == TOGETHER => keys
+                            .iter()
+                            .try_for_each(|(key, value)| self.set(&mut study, key, value))?,
+                        _ => self.set(&mut study, key, value)?,
+                    }
                 }
                 Ok(Point {
                     settings: chosen
@@ -282,11 +300,21 @@ mod tests {
     }
 
     #[test]
+    fn keys_change_together() {
+        let text = "study = \"raceline\"\n[grid]\ntogether = [{ cognitive = 1, social = 3 }, { cognitive = 3, social = 1 }]\n";
+        let sweep = SweepSettings::parse(Path::new("s.toml"), text).expect("a sweep");
+        let points = sweep.points().expect("points");
+        assert_eq!(points[1].settings["together"], "cognitive 3, social 1");
+        assert_eq!(points[1].study, "cognitive = 3\nsocial = 1\n");
+    }
+
+    #[test]
     fn what_is_no_sweep_is_refused_by_place() {
         for (text, place) in [
             ("study = \"cook\"\n", "study"),
             ("study = \"identify\"\n", "grid"),
             ("study = \"identify\"\n[grid]\nseed = 1\n", "grid, seed"),
+            ("study = \"identify\"\n[grid]\ntogether = [1]\n", "grid, together"),
             ("study = \"identify\"\nmore = 1\n[grid]\nseed = [1]\n", "more"),
             ("study = \n", "line 1"),
         ] {

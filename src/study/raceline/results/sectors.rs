@@ -1,8 +1,10 @@
 //! A line that was looked for sector by sector: what each is long, and the links between them.
 
 use crate::Result;
+use crate::line::geometry;
 use crate::report::{HtmlReport, Table};
 use crate::study::raceline::{RacelineSettings, ReportedLine, Setup};
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 /// A sector of a line.
@@ -14,6 +16,23 @@ pub struct SectorFigures {
     pub length_m: f64,
     /// Length from its last cross-section to the first of the next sector (m).
     pub link_m: f64,
+    /// Gamma between its first cross-section and its last (1/m), by true spacing.
+    pub gamma_1pm: f64,
+    /// What the right edge of the usable road has instead (`alpha` 0).
+    pub right: SectorShape,
+    /// What the middle of the road has (`alpha` 0.5).
+    pub middle: SectorShape,
+    /// What the left edge has (`alpha` 1).
+    pub left: SectorShape,
+}
+
+/// The shape of a line within a sector.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SectorShape {
+    /// Length from the first cross-section to the last (m).
+    pub length_m: f64,
+    /// Gamma between them (1/m), by true spacing.
+    pub gamma_1pm: f64,
 }
 
 /// The sectors of a line; none where it was looked for at once.
@@ -21,19 +40,28 @@ pub(super) fn of(settings: &RacelineSettings, setup: &Setup, line: &ReportedLine
     if settings.sectors == 1 {
         return Vec::new();
     }
-    let points = setup.cross_sections.points(&line.alpha);
-    let n = points.len();
-    let step_m = |i: usize| match i + 1 {
-        next if next < n => points[i].distance(points[next]),
-        _ if setup.cross_sections.closed => points[i].distance(points[0]),
-        _ => 0.0,
-    };
+    let road = &setup.cross_sections;
+    let points = road.points(&line.alpha);
+    let [right, middle, left] = [0.0, 0.5, 1.0].map(|alpha| road.points(&vec![alpha; road.len()]));
     let sector = |number: usize| {
-        let sector = setup.cross_sections.sector(number, settings.sectors);
+        let sector = road.sector(number, settings.sectors);
+        let shape = |points: &[DVec2]| {
+            let shape = geometry(&points[sector.clone()], false);
+            SectorShape {
+                length_m: shape.length_m,
+                gamma_1pm: shape.gamma_1pm,
+            }
+        };
+        let own = shape(&points);
+        let next = points.get(sector.end).or(points.first().filter(|_| road.closed));
         SectorFigures {
             sections: sector.len(),
-            link_m: step_m(sector.end - 1),
-            length_m: (sector.start..sector.end - 1).map(step_m).sum(),
+            length_m: own.length_m,
+            link_m: next.map_or(0.0, |next| points[sector.end - 1].distance(*next)),
+            gamma_1pm: own.gamma_1pm,
+            right: shape(&right),
+            middle: shape(&middle),
+            left: shape(&left),
         }
     };
     (0..settings.sectors).map(sector).collect()
@@ -71,6 +99,13 @@ pub(super) fn place(page: &mut HtmlReport, sectors: &[SectorFigures]) -> Result<
         .number("cross-sections", "", |(_, s)| s.sections as f64)
         .number("length", "m", |(_, s)| s.length_m)
         .number("link to the next", "m", |(_, s)| s.link_m)
+        .number("Gamma", "1/m", |(_, s)| s.gamma_1pm)
+        .number("length at the right edge", "m", |(_, s)| s.right.length_m)
+        .number("length in the middle", "m", |(_, s)| s.middle.length_m)
+        .number("length at the left edge", "m", |(_, s)| s.left.length_m)
+        .number("Gamma at the right edge", "1/m", |(_, s)| s.right.gamma_1pm)
+        .number("Gamma in the middle", "1/m", |(_, s)| s.middle.gamma_1pm)
+        .number("Gamma at the left edge", "1/m", |(_, s)| s.left.gamma_1pm)
         .table();
     page.table("Sector by sector", "", &table)
 }
