@@ -387,6 +387,42 @@ mod tests {
         }
     }
 
+    /// Pieces that are passed over are none of the nearest: on a winding road, distances are those from all of its edge, and the
+    /// cross-section abreast is the nearest of all.
+    #[test]
+    fn what_is_passed_over_is_farther() {
+        let n = 500;
+        let middle: Vec<DVec2> = (0..n)
+            .map(|i| f64::from(i) * std::f64::consts::TAU / f64::from(n))
+            .map(|t| (150.0 + 20.0 * (7.0 * t).sin()) * DVec2::from_angle(t))
+            .collect();
+        let [right, left] = road(&middle);
+        let edges = RoadEdges::new(&right, &left, true);
+        let from_piece = |point: DVec2, from: DVec2, to: DVec2| {
+            let along = to - from;
+            let share = ((point - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+            point.distance(from + share * along)
+        };
+        let points: Vec<DVec2> = (0..middle.len())
+            .map(|i| left[i].lerp(right[i], 0.1 + 0.08 * (i % 11) as f64))
+            .collect();
+        for (point, abreast) in points.iter().zip(edges.abreast(&points)) {
+            let nearest = (0..middle.len()).min_by(|&i, &j| {
+                point
+                    .distance(edges.middle(i))
+                    .total_cmp(&point.distance(edges.middle(j)))
+            });
+            assert_eq!(Some(abreast), nearest);
+            for (edge, is_left) in [(&right, false), (&left, true)] {
+                let pieces = edge.iter().zip(edge.iter().skip(1).chain(&edge[..1]));
+                let all = pieces.map(|(from, to)| from_piece(*point, *from, *to));
+                let least = all.fold(f64::INFINITY, f64::min);
+                let found = edges.inside(*point, abreast, is_left);
+                assert!((found - least).abs() < 1e-9, "{point}: {found} and {least}");
+            }
+        }
+    }
+
     /// A point on the edge itself, and points either side of it, on a straight where all pieces lie in one line.
     #[test]
     fn a_point_on_the_edge_is_no_distance_from_it() {

@@ -327,6 +327,7 @@ impl Role {
             Self::Y => &["ym", "posy", "positiony", "yposition", "carposy", "y"],
         }
     }
+
     /// Names that are also given to other quantities, written as the usual ones: a channel of such a name plays the role only if
     /// its unit is one of the role's.
     pub(super) fn names_with_unit(self) -> &'static [&'static str] {

@@ -79,8 +79,8 @@ struct Quick {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Asked {
-    /// Its key in the study's summary, with dots through tables and numbers from 0 through lists; in a sweep, that of a column, or
-    /// `elapsed_s`.
+    /// Its key in the study's summary, with dots through tables; in a sweep, that of a column, or `elapsed_s`. `*` stands for all
+    /// members of a list, each with a row of its own: `sites.*.start_m`.
     pub figure: String,
     /// What it is called.
     pub name: String,
@@ -108,6 +108,24 @@ pub struct Asked {
 
 fn one() -> f64 {
     1.0
+}
+
+impl Asked {
+    /// The figure itself; where it is one of each member of a list, those of the members that are there, numbered from 1.
+    pub(super) fn each(&self, is_there: impl Fn(&str) -> bool) -> Vec<Self> {
+        if !self.figure.contains('*') {
+            return vec![self.clone()];
+        }
+        let member = |place: usize| Self {
+            figure: self.figure.replace('*', &place.to_string()),
+            of: format!("{} {}", self.of, place + 1),
+            ..self.clone()
+        };
+        (0..)
+            .map(member)
+            .take_while(|asked| is_there(&asked.figure))
+            .collect()
+    }
 }
 
 /// How a table is filled.

@@ -260,20 +260,12 @@ impl AtWork<'_> {
         let path = self.folder.join(SUMMARY);
         let summary: serde_json::Value = serde_json::from_str(&read_text(&path)?)
             .map_err(|e| Error::input(&path, "contents", e.to_string(), "the summary of a study"))?;
-        let at = |key: &str| {
-            let found = key
-                .split('.')
-                .try_fold(&summary, |within, part| match part.parse::<usize>() {
-                    Ok(place) if within.is_array() => within.get(place),
-                    _ => within.get(part),
-                });
-            found.and_then(serde_json::Value::as_f64)
-        };
-        let keys = asked.iter().map(|asked| asked.figure.as_str());
-        let known = keys
-            .chain(["evaluations"])
-            .filter_map(|key| Some((key, at(key)?)));
-        let figures: Figures = known.map(|(key, v)| (key.to_owned(), Some(v))).collect();
+        let at = |key: &str| summary.pointer(&format!("/{}", key.replace('.', "/")))?.as_f64();
+        let each = asked.iter().flat_map(|asked| asked.each(|key| at(key).is_some()));
+        let keys = each.map(|asked| asked.figure).chain(["evaluations".to_owned()]);
+        let figures: Figures = keys
+            .filter_map(|key| Some((key.clone(), Some(at(&key)?))))
+            .collect();
         let row = Row {
             figures,
             ..Row::default()

@@ -140,6 +140,7 @@ fn compared(asked: &Asked, groups: &[Group]) -> Vec<Compared> {
 impl TableSummary {
     pub(super) fn new(chapter: &Chapter, item: &Item, rows: Vec<Row>, took: Took) -> Self {
         let groups = medians(&rows);
+        let is_there = |key: &str| groups.iter().any(|group| group.figures.contains_key(key));
         let evaluations: Option<f64> = rows.iter().map(|row| *row.figures.get("evaluations")?).sum();
         Self {
             chapter: chapter.number,
@@ -149,7 +150,8 @@ impl TableSummary {
             rows: item
                 .figures
                 .iter()
-                .flat_map(|asked| compared(asked, &groups))
+                .flat_map(|asked| asked.each(is_there))
+                .flat_map(|asked| compared(&asked, &groups))
                 .collect(),
             runs: rows.len(),
             evaluations,
@@ -394,6 +396,21 @@ mod tests {
         assert_eq!(one[0].difference_percent, Some(25.0));
         let sum = compared(&asked("sum = true\nscale = 0.5"), &groups);
         assert_eq!((sum.len(), sum[0].median, sum[0].runs), (1, Some(16.0), 4));
+        // A list has a row for each of its members.
+        let sites = Asked {
+            figure: "sites.*.start_m".to_owned(),
+            of: "site".to_owned(),
+            ..asked("")
+        };
+        let of_each = sites.each(|key| ["sites.0.start_m", "sites.1.start_m"].contains(&key));
+        let of_each: Vec<_> = of_each
+            .iter()
+            .map(|a| (a.of.as_str(), a.figure.as_str()))
+            .collect();
+        assert_eq!(
+            of_each,
+            [("site 1", "sites.0.start_m"), ("site 2", "sites.1.start_m")]
+        );
         // A figure that no run has is an empty cell, and no zero.
         let none = Asked {
             figure: "speed".to_owned(),
