@@ -109,6 +109,10 @@ const STAGES: [About; 3] = [
 ];
 /// How many times farther apart cross-sections are on straights, where lines bend little.
 const STRAIGHTS: f64 = 3.0;
+/// On laps shorter than this (m), the stages after the first are closer in proportion, down to this share. An error of one bend is a
+/// greater part of a short lap.
+const SHORT_M: f64 = 1400.0;
+const CLOSEST: f64 = 0.7;
 /// A control takes as many of the track's own cross-sections at the least. A stage that would bring controls no closer than to this
 /// share of their distance is as the one before it.
 const CROSS_SECTIONS_TO_SAY_CONTROL: f64 = 1.25;
@@ -309,15 +313,21 @@ impl ReferenceSolvers {
             programs: PROGRAMS_ONCE,
             ..stages[stages.len() - 1]
         };
-        self.about_itself(alpha, &[closest])
+        let about = self.about_itself(alpha, &[closest])?;
+        Ok(about.map(|solved| Optimum {
+            x: within_road(solved.x),
+            ..solved
+        }))
     }
 
     /// [`STAGES`] as the track's cross-sections can say them: one that would not be closer is as its predecessor.
     fn stages(&self) -> [About; STAGES.len()] {
         let own_m = self.cross_sections.length_m / self.cross_sections.len() as f64;
         let mut stages = STAGES;
+        let closer = (self.cross_sections.length_m / SHORT_M).clamp(CLOSEST, 1.0);
         for turn in 1..stages.len() {
             let (before, stage) = (stages[turn - 1], &mut stages[turn]);
+            stage.spacing_m *= closer;
             let needed = (CROSS_SECTIONS_TO_SAY_CONTROL * own_m / stage.spacing_m).ceil() as usize;
             stage.cross_sections_per_control = stage.cross_sections_per_control.max(needed);
             if stage.control_m() > CLOSER * before.control_m() {
@@ -398,10 +408,9 @@ impl ReferenceSolvers {
         let rounds = if kept { TIGHTENINGS } else { 0 };
         for round in 0..=rounds {
             let points = map.line(&solved.x);
-            let Ok(shares) = shares_across(&self.cross_sections, &points) else {
+            let Ok(x) = shares_across(&self.cross_sections, &points) else {
                 break;
             };
-            let x = within_road(shares);
             let driven = self.driven(&x)?;
             if best
                 .as_ref()
@@ -438,9 +447,22 @@ impl ReferenceSolvers {
             Some((&self.car, &self.cross_sections.drs)),
             self.entry_mps,
         )?;
-        let clearances_m = self.room.as_ref().map_or_else(Vec::new, |room| {
+        let mut clearances_m = self.room.as_ref().map_or_else(Vec::new, |room| {
             RoadEdges::new(&room.edges_m[0], &room.edges_m[1], fine.closed).clearances(&fine, &room.car)
         });
+        // A line beyond the end of a cross-section has no room there: held at the end, it would have a kink.
+        for (room_m, (section, share)) in clearances_m.iter_mut().zip(&fine.section) {
+            if *share == 0.0 {
+                let (right, left) = (
+                    self.cross_sections.right_m[*section],
+                    self.cross_sections.left_m[*section],
+                );
+                let beyond = [-alpha[*section], alpha[*section] - 1.0];
+                for (room_m, beyond) in room_m.iter_mut().zip(beyond).filter(|(_, beyond)| *beyond > 0.0) {
+                    *room_m = room_m.min(-beyond * right.distance(left));
+                }
+            }
+        }
         Ok(Driven { fine, clearances_m })
     }
 

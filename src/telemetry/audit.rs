@@ -21,7 +21,8 @@ fn limit(role: Role) -> Option<(f64, &'static str, &'static str)> {
         Role::Vx => (150.0, "m/s", "is it in km/h?"),
         Role::Ax | Role::Ay => (60.0, "m/s^2", "is the unit right?"),
         Role::YawRate => (10.0, "rad/s", "is it in deg/s?"),
-        Role::Distance
+        Role::Heading
+        | Role::Distance
         | Role::Lap
         | Role::LapComplete
         | Role::Throttle

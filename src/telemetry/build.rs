@@ -7,16 +7,20 @@ use std::sync::Arc;
 use super::audit::check_magnitude;
 use super::calibration::Calibration;
 use super::channel_map::{Axle, ChannelMap, Mapped};
-use super::derived::{acceleration, product};
+use super::derived::{acceleration, acceleration_span, product};
 use super::laps::{LEAST_M, Lap, Marks, restarts};
 use super::log::{Log, LogOptions};
 use super::path::start_line;
-use super::recording::{Channel, Clock, Format, Recording};
+use super::recording::{Channel, Clock, Format, Recording, Unreadable};
 use super::resample::{Grid, check_times, onto, uniform_interval};
 use super::role::Role;
+use super::statistics::derivative;
 use super::text::shown;
 use super::units::Quantity;
 use crate::{Error, Place, Result};
+
+/// Speed (m/s) up to which positions tell of no direction.
+const STANDING_MPS: f64 = 2.0;
 
 /// A mapped channel in SI, with its times.
 pub(super) struct Signal<'a> {
@@ -33,7 +37,6 @@ pub(super) fn signals<'a>(
     source: &str,
     mapped: &[Mapped<'a>],
     map: &ChannelMap,
-    options: &LogOptions,
     radius: Option<[f64; 2]>,
 ) -> Result<Vec<Signal<'a>>> {
     let mut signals: Vec<Signal<'a>> = Vec::new();
@@ -50,7 +53,7 @@ pub(super) fn signals<'a>(
             Some(signal) => (Arc::clone(&signal.times), signal.nominal_s),
             None => {
                 let times = times(source, channel)?;
-                let nominal = check_times(source, channel, &times, options.bridge_gaps_s)?;
+                let nominal = check_times(source, channel, &times, map.bridged_s())?;
                 (times, nominal)
             }
         };
@@ -68,6 +71,11 @@ pub(super) fn signals<'a>(
         } else {
             channel.values.iter().map(|v| v * factor).collect()
         };
+        let values = if m.role == Role::Heading {
+            Cow::Owned(turned(&values))
+        } else {
+            values
+        };
         // Steering is checked once it is known which angle it is.
         if m.role != Role::Steer {
             check_magnitude(source, m, &values)?;
@@ -81,6 +89,30 @@ pub(super) fn signals<'a>(
         });
     }
     Ok(signals)
+}
+
+/// Headings (rad, clockwise) without the jumps of full turns.
+fn turned(headings: &[f64]) -> Vec<f64> {
+    let full = std::f64::consts::TAU;
+    let mut turns = 0.0;
+    let mut last: Option<f64> = None;
+    let on = |&heading: &f64| {
+        turns -= last
+            .replace(heading)
+            .map_or(0.0, |last| ((heading - last) / full).round());
+        heading + turns * full
+    };
+    headings.iter().map(on).collect()
+}
+
+/// The yaw rate (rad/s, to the left) that headings (rad, to the right, without jumps) tell of. A car that hardly moves has any.
+fn yaw_rate(log: &Log, headings: &[f64]) -> Vec<f64> {
+    let change = derivative(headings, log.dt_s, acceleration_span(log)).into_iter();
+    let speeds = log.vx_mps.iter();
+    change
+        .zip(speeds)
+        .map(|(rate, v)| if *v > STANDING_MPS { -rate } else { 0.0 })
+        .collect()
 }
 
 /// Refuses a channel with samples that are no numbers.
@@ -239,7 +271,7 @@ impl Build<'_> {
             drs: Vec::new(),
             ax_mps2: Vec::new(),
             ay_mps2: Vec::new(),
-            yaw_rate_radps: needed(Role::YawRate)?,
+            yaw_rate_radps: Vec::new(),
             wheel_speed_radps,
             laps: Vec::new(),
             calibration,
@@ -263,6 +295,16 @@ impl Build<'_> {
         log.vx_mps = match find(Role::Vx) {
             Some(signal) => sampled(signal),
             None => self.speed_of_wheels(&mut log)?,
+        };
+        log.yaw_rate_radps = match (find(Role::YawRate), find(Role::Heading)) {
+            (None, Some(heading)) => {
+                note(
+                    &mut log,
+                    "yaw_rate: not logged; the change of the heading stands in for it",
+                );
+                yaw_rate(&log, &sampled(heading))
+            }
+            _ => needed(Role::YawRate)?,
         };
         // What stands in leaves out how the sideslip changes.
         log.ax_mps2 = match find(Role::Ax) {
@@ -454,10 +496,13 @@ enum Clocked {
     Resampled(Grid),
 }
 
-/// Lap numbers from the values of their channel.
+/// Longest pause (s) of a lap number over which the lap before goes on where the number is another one after it.
+const LAP_GAP_S: f64 = 1.0;
+
+/// Lap numbers from the values of their channel. One that is missing between two that are the same is that one.
 pub(super) fn lap_numbers(source: &str, channel: &Channel, values: &[f64]) -> Result<Vec<u32>> {
     // RaceChrono leaves the number out before the first line and after the last.
-    let is_empty = channel.unreadable.as_ref().is_some_and(|bad| bad.text.is_empty());
+    let is_empty = channel.unreadable.as_ref().is_some_and(Unreadable::is_missing);
     let number = |(at, &value): (usize, &f64)| {
         if value.is_nan() && is_empty {
             Ok(0)
@@ -472,7 +517,18 @@ pub(super) fn lap_numbers(source: &str, channel: &Channel, values: &[f64]) -> Re
             ))
         }
     };
-    values.iter().enumerate().map(number).collect()
+    let mut numbers: Vec<u32> = values.iter().enumerate().map(number).collect::<Result<_>>()?;
+    let mut last: Option<usize> = None;
+    for next in (0..values.len()).filter(|i| !values[*i].is_nan()) {
+        if let Some(before) = last.replace(next) {
+            let same = numbers[before] == numbers[next];
+            if same || channel.time_s(next) - channel.time_s(before) <= LAP_GAP_S {
+                let lap = numbers[before];
+                numbers[before..next].fill(lap);
+            }
+        }
+    }
+    Ok(numbers)
 }
 
 /// Rates that a log may have (Hz).
@@ -565,6 +621,44 @@ mod tests {
         }
         // A car that stands in its box.
         assert!(advances(&[0.0; 200], &integrated(&[0.01; 200], 0.1), &laps));
+    }
+
+    /// A sensor that drops out does not end a lap. RaceChrono leaves the number out where there is none.
+    #[test]
+    fn missing_lap_numbers_are_those_about_them() {
+        let none = f64::NAN;
+        let values = vec![
+            none, 1.0, none, none, none, 1.0, none, 2.0, none, none, none, 3.0, none,
+        ];
+        let lap = Channel {
+            name: "Lap".into(),
+            unit: String::new(),
+            clock: Clock::Rate {
+                start_s: 0.0,
+                rate_hz: 2.5,
+            },
+            unreadable: Some(Unreadable {
+                sample: 0,
+                text: String::new(),
+            }),
+            lines: None,
+            values,
+        };
+        // A pause of 0.8 s between two laps, and one of 1.6 s.
+        let numbers = lap_numbers("a.csv", &lap, &lap.values).unwrap();
+        assert_eq!(numbers, [0, 1, 1, 1, 1, 1, 1, 2, 0, 0, 0, 3, 0]);
+    }
+
+    /// A lap of a circle to the left in 10 s: a compass goes from 1 through north to 1 again.
+    #[test]
+    fn headings_turn_without_jumps() {
+        let compass =
+            |i: usize| (1.0 - std::f64::consts::TAU * i as f64 / 100.0).rem_euclid(std::f64::consts::TAU);
+        let headings = turned(&(0..=100).map(compass).collect::<Vec<_>>());
+        for (i, heading) in headings.iter().enumerate() {
+            let expected = 1.0 - std::f64::consts::TAU * i as f64 / 100.0;
+            assert!((heading - expected).abs() < 1e-12, "{i}: {heading}");
+        }
     }
 
     #[test]

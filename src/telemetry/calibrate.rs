@@ -11,7 +11,7 @@ use super::derived::{
 use super::laps::Lap;
 use super::log::{Log, Steering};
 use super::role::Role;
-use super::statistics::{Fit, derivative, fit, regression};
+use super::statistics::{Fit, derivative, fit, regression, smoothed};
 use std::f64::consts::TAU;
 
 /// Standing still, m/s.
@@ -300,8 +300,12 @@ fn offset_at_rest(log: &Log) -> Option<Offset> {
     })
 }
 
+/// Half of the time over which a car's sideways motion comes to nothing (s).
+const SIDEWAYS_S: f64 = 2.0;
+
 /// The offset of ay over whole laps, on which the car's own sideways motion begins and ends alike: what is left beside speed times
-/// yaw rate, with whatever factor, is an offset or the road's mean bank.
+/// yaw rate, with whatever factor, is an offset or the road's mean bank. Both are smoothed: within seconds the sideways motion goes
+/// with the turning, and would pass for a part of the factor.
 fn ay_offset(log: &Log, laps: &[(Lap, f64)]) -> Option<Offset> {
     let mut mask = vec![false; log.samples()];
     for (lap, _) in laps {
@@ -310,9 +314,10 @@ fn ay_offset(log: &Log, laps: &[(Lap, f64)]) -> Option<Offset> {
     for (allowed, moving) in mask.iter_mut().zip(moving(log)) {
         *allowed &= moving;
     }
-    let turning = product(&log.vx_mps, &log.yaw_rate_radps);
+    let half = (SIDEWAYS_S / log.dt_s).round() as usize;
+    let turning = smoothed(&product(&log.vx_mps, &log.yaw_rate_radps), half);
     let one = vec![1.0; log.samples()];
-    let found = regression(&log.ay_mps2, [&turning, &one], &mask)?;
+    let found = regression(&smoothed(&log.ay_mps2, half), [&turning, &one], &mask)?;
     Some(Offset {
         value: found.factors[1],
         standard_error: found.standard_errors[1],

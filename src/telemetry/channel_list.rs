@@ -61,12 +61,13 @@ impl ChannelList {
             .iter()
             .filter_map(|(_, found)| found.as_ref().ok()?.as_ref())
             .collect();
+        let has_heading = taken.iter().any(|m| m.role == Role::Heading);
         let free = |channel: &Channel| !taken.iter().any(|m| std::ptr::eq(m.channel, channel));
         let missing = found.iter().filter_map(|(role, found)| {
             let refused = match found {
                 Ok(Some(_)) => return None,
-                // Positions help where laps are not told, and no log lacks them otherwise.
-                Ok(None) if role.of_place() => return None,
+                // Positions help where laps are not told, a heading where the yaw rate is not, and no log lacks them otherwise.
+                Ok(None) if role.of_place() || *role == Role::Heading => return None,
                 Ok(None) => None,
                 Err(error) => Some(error.to_string()),
             };
@@ -78,7 +79,11 @@ impl ChannelList {
             };
             Some(Missing {
                 role: *role,
-                without: without(*role),
+                without: if *role == Role::YawRate && has_heading {
+                    "the change of the heading stands in for it"
+                } else {
+                    without(*role)
+                },
                 refused,
                 candidates: recording
                     .channels
@@ -122,7 +127,7 @@ impl ChannelList {
             .iter()
             .map(|c| {
                 let range = match c.range {
-                    Some([least, greatest]) => format!("{} to {}", figure(least), figure(greatest)),
+                    Some(ends) => range(ends),
                     None => "no numbers".to_owned(),
                 };
                 let why = match (c.role, c.unreadable) {
@@ -170,7 +175,8 @@ impl ChannelList {
     /// those that none plays.
     pub fn map_text(&self) -> String {
         let mut text = format!(
-            "# Channels of {}, as `lapswarm check` took them. Mend what is wrong.\n\n",
+            "# Channels of {}, as `lapswarm check` took them. Mend what is wrong.\n\n\
+             # bridge_gaps_s = 0.2             # longest gap that a straight line bridges\n\n",
             quoted(&self.source)
         );
         let played = |role: Role| self.channels.iter().find(|c| c.role == Some(role));
@@ -221,6 +227,7 @@ fn without(role: Role) -> &'static str {
         }
         Role::Steer => "needed: the steering angle drives the model",
         Role::YawRate => "needed: the model is compared with it",
+        Role::Heading => "not needed",
         Role::Vx => "the speed of the undriven wheels stands in for it",
         Role::Ax => "the change of speed stands in for it",
         Role::Ay => "speed times yaw rate stands in for it",
@@ -261,13 +268,28 @@ fn listed(channel: &Channel, taken: Option<&Mapped<'_>>) -> ListedChannel {
     }
 }
 
-/// Four significant digits, which is enough to see what a channel is.
-fn figure(value: f64) -> String {
-    let digits = if value == 0.0 {
+/// Both ends of a range, with as many digits as it takes to tell them apart.
+fn range([least, greatest]: [f64; 2]) -> String {
+    let apart = digits_of(greatest - least, 2);
+    let end = |value: f64| rounded(value, digits_of(value, 4).max(apart));
+    format!("{} to {}", end(least), end(greatest))
+}
+
+/// Decimal places that show so many significant digits.
+fn digits_of(value: f64, significant: i32) -> usize {
+    if value == 0.0 {
         0
     } else {
-        (3 - value.abs().log10().floor() as i32).clamp(0, 6) as usize
-    };
+        (significant - 1 - value.abs().log10().floor() as i32).clamp(0, 6) as usize
+    }
+}
+
+/// Four significant digits, which is enough to see what a channel is.
+fn figure(value: f64) -> String {
+    rounded(value, digits_of(value, 4))
+}
+
+fn rounded(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -336,6 +358,13 @@ mod tests {
             text.contains("# [channels.yaw_rate]\n# name = \"FL\" or \"Gyro\"\n"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn the_ends_of_a_range_can_be_told_apart() {
+        assert_eq!(range([51.998_12, 52.001_37]), "51.9981 to 52.0014");
+        assert_eq!(range([36.0, 72.0]), "36 to 72");
+        assert_eq!(range([1.0, 1.0]), "1 to 1");
     }
 
     #[test]

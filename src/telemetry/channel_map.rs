@@ -54,7 +54,13 @@ pub struct ChannelMap {
     pub rear_rolling_radius_m: Option<f64>,
     /// The axle whose wheel speeds replace a ground speed that is not logged: the undriven one.
     pub speed_axle: Axle,
+    /// Gaps of up to this (s) are bridged by a straight line, 0.2 s where it is not given. Intervals of up to three times the nominal
+    /// one are no gaps.
+    pub bridge_gaps_s: Option<f64>,
 }
+
+/// Gaps that are bridged where nothing else is said (s): a car hardly changes what it does within them.
+const BRIDGED_S: f64 = 0.2;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -79,6 +85,7 @@ struct FileVehicle {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FileMap {
+    bridge_gaps_s: Option<Spanned<f64>>,
     #[serde(default)]
     channels: BTreeMap<Role, FileEntry>,
     #[serde(default)]
@@ -191,7 +198,18 @@ impl ChannelMap {
                 |v| (0.05..=2.0).contains(&v),
             )?,
             speed_axle: file.vehicle.speed_axle,
+            bridge_gaps_s: checked(
+                file.bridge_gaps_s,
+                "bridge_gaps_s",
+                "a time between 0 and 60 s",
+                |v| (0.0..=60.0).contains(&v),
+            )?,
         })
+    }
+
+    /// Gaps of up to this (s) are bridged by a straight line.
+    pub(super) fn bridged_s(&self) -> f64 {
+        self.bridge_gaps_s.unwrap_or(BRIDGED_S)
     }
 
     /// The rolling radii (m) of the front and the rear wheels, if it gives any.
@@ -200,16 +218,19 @@ impl ChannelMap {
         Some([front, self.rear_rolling_radius_m.unwrap_or(front)])
     }
 
-    /// Finds the channel of each role.
+    /// Finds the channel of each role. That of the heading has none where the yaw rate has one.
     ///
     /// # Errors
     /// [`Error::Input`] when a channel the map names is not in the recording, a required role finds no channel, or a
     /// channel's unit is unknown or measures something else.
     pub fn resolve<'a>(&self, recording: &'a Recording) -> Result<Vec<Mapped<'a>>> {
-        let mut mapped = Vec::new();
+        let mut mapped: Vec<Mapped<'a>> = Vec::new();
         for role in Role::ALL {
+            let turns = || mapped.iter().any(|m| m.role == Role::YawRate);
             match self.find(role, recording)? {
+                Some(_) if role == Role::Heading && turns() => {}
                 Some(found) => mapped.push(found),
+                None if role == Role::YawRate && self.find(Role::Heading, recording)?.is_some() => {}
                 None if role.required() => return Err(Self::none_found(role, recording)),
                 None => {}
             }
@@ -261,7 +282,10 @@ impl ChannelMap {
         let unit = match check_unit(unit_text, role) {
             Ok(unit) => unit,
             // A pedal in volts cannot be used, and the map does not name it.
-            Err(_) if name.is_none() && matches!(role, Role::Throttle | Role::Brake | Role::Drs) => {
+            Err(_)
+                if name.is_none()
+                    && matches!(role, Role::Throttle | Role::Brake | Role::Drs | Role::Heading) =>
+            {
                 return Ok(None);
             }
             Err(expected) => {
@@ -360,10 +384,17 @@ fn guess(role: Role, recording: &Recording) -> Option<&Channel> {
     let called = |name: &str| recording.channels.iter().find(|c| key(&c.name) == name);
     let fits = |c: &&Channel| check_unit(&c.unit, role).is_ok();
     let mut with_unit = role.names_with_unit().iter();
+    let only = || {
+        let part = role.part_of_names()?;
+        let of_part = |c: &&Channel| key(&c.name).contains(part) && fits(c);
+        let mut all = recording.channels.iter().filter(of_part);
+        all.next().filter(|_| all.next().is_none())
+    };
     role.usual_names()
         .iter()
         .find_map(|name| called(name))
         .or_else(|| with_unit.find_map(|name| called(name).filter(fits)))
+        .or_else(only)
 }
 
 /// The names of a recording's channels, for messages.
@@ -462,6 +493,10 @@ mod tests {
                 ["line 2, field vehicle.rolling_radius_m", "325"],
             ),
             ("[vehicle]\nmass = 1", ["line 2", "`mass`"]),
+            (
+                "\nbridge_gaps_s = -1",
+                ["line 2, field bridge_gaps_s: found -1", "0 and 60 s"],
+            ),
             ("a = ", ["line 1", "m.toml"]),
         ] {
             let error = ChannelMap::parse(text, "m.toml").unwrap_err().to_string();
@@ -480,6 +515,42 @@ mod tests {
             assert_eq!(m.channel.name, name);
             assert!(!m.declared);
         }
+    }
+
+    /// Names that nobody has thought of, with units that tell; not where two could be meant.
+    #[test]
+    fn parts_of_names_are_found_by_their_units() {
+        let found = |channels: &[(&str, &str)], role: Role| {
+            let recording = recording(channels);
+            let found = ChannelMap::default().find(role, &recording).unwrap();
+            found.map(|m| m.channel.name.clone())
+        };
+        let truck = [
+            ("SteerWheel_Actual", "deg"),
+            ("Steering Torque", "Nm"),
+            ("Body Yaw", "deg/s"),
+        ];
+        assert_eq!(found(&truck, Role::Steer).as_deref(), Some("SteerWheel_Actual"));
+        assert_eq!(found(&truck, Role::YawRate).as_deref(), Some("Body Yaw"));
+        let two = [("Steer Left Wheel", "deg"), ("Steer Right Wheel", "deg")];
+        assert_eq!(found(&two, Role::Steer), None);
+    }
+
+    /// A heading is needed where there is no yaw rate, and left alone where there is one.
+    #[test]
+    fn a_heading_stands_in_for_a_yaw_rate() {
+        let roles = |channels: &[(&str, &str)]| -> Result<Vec<Role>> {
+            let recording = recording(channels);
+            let mapped = ChannelMap::default().resolve(&recording)?;
+            Ok(mapped.iter().map(|m| m.role).collect())
+        };
+        let kart = [("GPS Speed", "km/h"), ("Steering", "deg"), ("GPS Heading", "deg")];
+        assert_eq!(roles(&kart).unwrap(), [Role::Steer, Role::Vx, Role::Heading]);
+        assert!(roles(&kart[..2]).unwrap_err().to_string().contains("yaw_rate"));
+        let with_gyro = [&kart[..], &[("Gyro Z", "deg/s")]].concat();
+        assert_eq!(roles(&with_gyro).unwrap(), [Role::Steer, Role::Vx, Role::YawRate]);
+        let unknown = [kart[0], kart[1], ("Heading", ""), ("Gyro Z", "deg/s")];
+        assert_eq!(roles(&unknown).unwrap(), [Role::Steer, Role::Vx, Role::YawRate]);
     }
 
     #[test]

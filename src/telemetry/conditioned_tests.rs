@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::OnceLock;
 
+use super::statistics::smoothed;
 use super::{
     Calibration, CalibrationOptions, ChannelMap, FindingKind, Log, LogOptions, Recording, Role, Switch,
 };
@@ -272,6 +273,26 @@ fn offsets_are_found_and_small_ones_are_left() {
         hardly.ay_mps2.iter_mut().for_each(|a| *a += 0.03);
         assert_nothing_applied(&conditioned(&hardly));
     }
+}
+
+/// A driver who weaves: within two seconds, sideways motion takes three tenths of the turning off the lateral acceleration. With that
+/// taken for a part of the factor, 0.3 m/s^2 came off a log that is right.
+#[test]
+fn sideways_motion_is_no_offset() {
+    let mut log = perfect();
+    let turning: Vec<f64> = log
+        .vx_mps
+        .iter()
+        .zip(&log.yaw_rate_radps)
+        .map(|(v, r)| v * r)
+        .collect();
+    let slow = smoothed(&turning, (1.0 / log.dt_s) as usize);
+    for (ay, (turning, slow)) in log.ay_mps2.iter_mut().zip(turning.iter().zip(slow)) {
+        *ay -= 0.3 * (turning - slow);
+    }
+    let found = conditioned(&log).calibration;
+    let offset = found.finding(Role::Ay, FindingKind::Offset).unwrap();
+    assert!(!offset.applied && offset.value.abs() < 0.05, "{offset:?}");
 }
 
 /// Part of a lap turns by any angle: that is no offset.

@@ -376,7 +376,6 @@ mod tests {
                     ratio: 14.0,
                     wheelbase_m: 2.6,
                 }),
-                bridge_gaps_s: 1e6,
                 calibration: crate::telemetry::CalibrationOptions::all(crate::telemetry::Switch::On),
             }] {
                 if let Ok(recording) = Recording::parse(&bytes, "a.csv") {

@@ -12,9 +12,6 @@ use crate::{Error, Result};
 pub struct LogOptions {
     /// Sample rate of the log, Hz; `None` for the highest rate among the channels that are needed.
     pub rate_hz: Option<f64>,
-    /// Gaps of up to this (s) are bridged by a straight line; longer ones are errors. Intervals of up to three times
-    /// the nominal one are no gaps.
-    pub bridge_gaps_s: f64,
     /// The rolling radii (m) of the front and the rear wheels of the car being identified: wheel speeds are referred to them.
     pub rolling_radius_m: Option<[f64; 2]>,
     /// The steering of the car being identified: it tells a log of the steering wheel's angle from one of the road wheels', where the

@@ -105,7 +105,7 @@ impl Log {
             let size = format!("{recorded} samples, {samples} on one clock");
             check_memory(&recording.source, &size, needed, limit)
         };
-        let mut signals = signals(&source, &mapped, map, options, radius)?;
+        let mut signals = signals(&source, &mapped, map, radius)?;
         let build = Build {
             source: &source,
             recording,
@@ -220,7 +220,6 @@ fn without_gaps<'a>(
 fn check_options(options: &LogOptions) -> Result<()> {
     let checks = [
         ("sample rate", options.rate_hz, RATES_HZ, "Hz"),
-        ("bridged gap", Some(options.bridge_gaps_s), 0.0..=1e6, "s"),
         (
             "rolling radius",
             options.rolling_radius_m.map(|r| r[0]),

@@ -77,13 +77,14 @@ pub(super) fn check_times(source: &str, channel: &Channel, times: &[f64], bridge
     let nominal = *intervals.select_nth_unstable_by(middle, f64::total_cmp).1;
     for (at, pair) in times.windows(2).enumerate() {
         let interval = pair[1] - pair[0];
-        if interval > GAP_INTERVALS * nominal && interval > bridged_s {
+        if interval > (GAP_INTERVALS + JITTER) * nominal && interval > bridged_s {
             return Err(Error::input(
                 source,
                 channel.place(at + 1),
                 format!("a gap of {interval:.3} s after t = {:.3} s", pair[0]),
                 format!(
-                    "samples every {nominal:.4} s, or a setting that bridges gaps of up to {interval:.3} s"
+                    "samples every {nominal:.4} s and gaps of up to {bridged_s} s, which bridge_gaps_s in the channel map \
+                     changes"
                 ),
             ));
         }

@@ -57,6 +57,8 @@ pub enum Role {
     Ay,
     /// Yaw rate.
     YawRate,
+    /// Direction over ground, clockwise as a compass has it: what stands in for a yaw rate that is not logged.
+    Heading,
     /// Distance travelled.
     Distance,
     /// Lap number.
@@ -81,7 +83,7 @@ pub enum Role {
 
 impl Role {
     /// All roles.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::WheelSpeedFl,
         Self::WheelSpeedFr,
         Self::WheelSpeedRl,
@@ -91,6 +93,7 @@ impl Role {
         Self::Ax,
         Self::Ay,
         Self::YawRate,
+        Self::Heading,
         Self::Distance,
         Self::Lap,
         Self::LapComplete,
@@ -122,6 +125,7 @@ impl Role {
             Self::Ax => "ax",
             Self::Ay => "ay",
             Self::YawRate => "yaw_rate",
+            Self::Heading => "heading",
             Self::Distance => "distance",
             Self::Lap => "lap",
             Self::LapComplete => "lap_complete",
@@ -143,7 +147,7 @@ impl Role {
             | Self::WheelSpeedRl
             | Self::WheelSpeedRr
             | Self::YawRate => "rad/s",
-            Self::Steer => "rad",
+            Self::Steer | Self::Heading => "rad",
             Self::Vx => "m/s",
             Self::Ax | Self::Ay => "m/s^2",
             Self::Distance | Self::X | Self::Y => "m",
@@ -158,7 +162,7 @@ impl Role {
     }
 
     /// Whether a log cannot do without it. Ground speed can be made of wheel speeds and wheel speeds of ground speed, accelerations
-    /// of speed and yaw rate.
+    /// of speed and yaw rate, and that of the heading.
     pub fn required(self) -> bool {
         matches!(self, Self::Steer | Self::YawRate)
     }
@@ -182,7 +186,7 @@ impl Role {
             Self::WheelSpeedFl | Self::WheelSpeedFr | Self::WheelSpeedRl | Self::WheelSpeedRr => {
                 &[Quantity::AngularSpeed, Quantity::Speed]
             }
-            Self::Steer => &[Quantity::Angle],
+            Self::Steer | Self::Heading => &[Quantity::Angle],
             Self::Vx => &[Quantity::Speed],
             Self::Ax | Self::Ay => &[Quantity::Acceleration],
             Self::YawRate => &[Quantity::AngularSpeed],
@@ -214,6 +218,7 @@ impl Role {
                 "steer",
                 "steerwheelangle",
                 "steeringwheel",
+                "steerwheel",
                 "handwheelangle",
                 "swa",
             ],
@@ -284,6 +289,16 @@ impl Role {
                 "gyroz",
                 "yawspeed",
             ],
+            Self::Heading => &[
+                "gpsheading",
+                "heading",
+                "gpscourse",
+                "course",
+                "courseoverground",
+                "gpsbearing",
+                "bearing",
+                "cog",
+            ],
             Self::Distance => &[
                 "distancem",
                 "lapdistance",
@@ -342,6 +357,15 @@ impl Role {
             Self::Ay => &["lateral"],
             Self::YawRate => &["yaw", "rotationz", "angularvelocityz", "omegaz", "wz"],
             _ => &[],
+        }
+    }
+
+    /// What names of it have in them, where their unit is one of the role's and no other such name has.
+    pub(super) fn part_of_names(self) -> Option<&'static str> {
+        match self {
+            Self::Steer => Some("steer"),
+            Self::YawRate => Some("yaw"),
+            _ => None,
         }
     }
 }

@@ -356,8 +356,11 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
         // Load transfer and force depend on each other. The iteration converges, since a change of one changes the other by a
         // sixth at most.
         for _ in 0..40 {
-            let rate = self.plain.rate(&state, &input).state.pitch_acceleration;
-            state.pitch_acceleration += rate * chassis.pitch_lag;
+            let change = self.plain.rate(&state, &input).state.pitch_acceleration * chassis.pitch_lag;
+            state.pitch_acceleration += change;
+            if change.abs() < 1e-12 {
+                break;
+            }
         }
         state.pitch_acceleration + drag
     }
@@ -369,14 +372,21 @@ pub(super) fn greatest(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     const SCAN: usize = 24;
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let step = (high - low) / SCAN as f64;
-    let at = |i: usize| low + step * i as f64;
-    let best = (0..=SCAN)
-        .max_by(|&i, &j| f(at(i)).total_cmp(&f(at(j))))
-        .unwrap_or(0);
-    let (mut a, mut b) = ((at(best) - step).max(low), (at(best) + step).min(high));
+    let scanned = (0..=SCAN).map(|i| low + step * i as f64).map(|x| (x, f(x)));
+    let best = scanned.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(low, |(x, _)| x);
+    let (mut a, mut b) = ((best - step).max(low), (best + step).min(high));
+    let inner = |a: f64, b: f64| [b - GOLDEN * (b - a), a + GOLDEN * (b - a)];
+    let [mut c, mut d] = inner(a, b).map(|x| (x, f(x)));
     while b - a > 1e-4 * (high - low) {
-        let (c, d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
-        if f(c) > f(d) { b = d } else { a = c }
+        if c.1 > d.1 {
+            (b, d) = (d.0, c);
+            let x = inner(a, b)[0];
+            c = (x, f(x));
+        } else {
+            (a, c) = (c.0, d);
+            let x = inner(a, b)[1];
+            d = (x, f(x));
+        }
     }
     0.5 * (a + b)
 }

@@ -84,6 +84,9 @@ const LOOKS_AT_STEPS: f64 = 20_000.0;
 const DRIVES: usize = 10;
 /// A longer list must lower the error by this share, or the shorter one is taken.
 const WORTH: f64 = 0.005;
+/// Share of the windows that were not fitted which a list has to drive. A window that it loses, such as one in which the car was already
+/// beyond its limit, does not count, neither for the list nor for the one that it is compared with.
+const LEAST_DRIVEN: f64 = 0.9;
 /// Lists that are tried beyond the best one.
 const PATIENCE: usize = 3;
 /// An error under this share of the spread is rounding.
@@ -266,16 +269,14 @@ pub(super) fn choose(
             "the starting car drives fewer than two windows to their end",
         ));
     }
-    let error = |paths: &[Path<'_>; 2]| -> Option<f64> {
-        let mut sum = [0.0, 0.0];
-        for (path, other) in paths.iter().zip([1, 0]) {
-            let squares = squares(&halves[other], &path.values, &weights)?;
-            sum = [sum[0] + squares[0], sum[1] + squares[1]];
-        }
-        Some((sum[0] / sum[1].max(1.0)).sqrt())
+    let judged = |paths: &[Path<'_>; 2]| -> Vec<Square> {
+        let each = paths.iter().zip([1, 0]);
+        each.flat_map(|(path, other)| squares(&halves[other], &path.values, &weights))
+            .collect()
     };
     let mut paths = [0, 1].map(|half| Path::begin(&halves[half], weights));
-    let Some(starting_error) = error(&paths) else {
+    let start = judged(&paths);
+    let Some(starting_error) = error_over(&start, &start) else {
         return Ok(every_one(None, "the starting car is lost"));
     };
     if starting_error < EXACT {
@@ -285,7 +286,7 @@ pub(super) fn choose(
         ));
     }
     let mut tried: Vec<Tried> = Vec::new();
-    let mut best = (1, starting_error);
+    let mut best = (1, start);
     // What the first half came to with the best list: it stands where the time does not reach to fit all windows.
     let mut found = (Vec::new(), Vec::new());
     let mut cut_short = false;
@@ -299,20 +300,28 @@ pub(super) fn choose(
         if cut_short {
             break;
         }
-        let Some(held_out_error) = error(&paths).filter(|_| longer) else {
+        if !longer {
             break;
-        };
-        tried.push(Tried {
-            parameters: count,
-            held_out_error,
-        });
-        since += 1;
-        if held_out_error < best.1 * (1.0 - WORTH) {
-            best = (count, held_out_error);
-            found = (paths[0].chosen.clone(), paths[0].values.clone());
-            since = 0;
         }
-        if since > PATIENCE || best.1 < EXACT {
+        since += 1;
+        let own = judged(&paths);
+        let driven = own.iter().flatten().count();
+        if driven as f64 >= LEAST_DRIVEN * own.len() as f64
+            && let Some(held_out_error) = error_over(&own, &own)
+        {
+            tried.push(Tried {
+                parameters: count,
+                held_out_error,
+            });
+            let [here, there] = [error_over(&own, &best.1), error_over(&best.1, &own)];
+            let (here, there) = here.zip(there).unwrap_or((f64::INFINITY, 0.0));
+            if here < there * (1.0 - WORTH) {
+                best = (count, own);
+                found = (paths[0].chosen.clone(), paths[0].values.clone());
+                since = 0;
+            }
+        }
+        if since > PATIENCE || error_over(&best.1, &best.1).is_some_and(|error| error < EXACT) {
             break;
         }
     }
@@ -348,14 +357,29 @@ pub(super) fn choose(
     })
 }
 
-/// Sum of the squared weighted errors, and their number; `None` if the car is lost.
-fn squares(problem: &ReplayProblem, values: &[f64], weights: &[f64; CHANNELS]) -> Option<[f64; 2]> {
-    let errors = problem.residuals(values)?.errors;
-    let squares = errors
-        .iter()
-        .enumerate()
-        .map(|(i, e)| (e * weights[i % CHANNELS]).powi(2));
-    Some([squares.sum(), errors.len() as f64])
+/// Sum of the squared weighted errors over one window, and their number; none if the car is lost there.
+type Square = Option<[f64; 2]>;
+
+/// Those of each window.
+fn squares(problem: &ReplayProblem, values: &[f64], weights: &[f64; CHANNELS]) -> Vec<Square> {
+    let mut one = problem.clone();
+    let mut square = |window: &Window<f64>| {
+        one.plan.windows = vec![*window];
+        let errors = one.residuals(values)?.errors;
+        let squares = errors
+            .iter()
+            .enumerate()
+            .map(|(i, e)| (e * weights[i % CHANNELS]).powi(2));
+        Some([squares.sum(), errors.len() as f64])
+    };
+    problem.plan.windows.iter().map(&mut square).collect()
+}
+
+/// The error over those windows that `others` drive, too: root mean square. None where there is no such window.
+fn error_over(of: &[Square], others: &[Square]) -> Option<f64> {
+    let both = of.iter().zip(others).filter_map(|(own, other)| other.and(*own));
+    let [sum, count] = both.fold([0.0, 0.0], |sum, s| [sum[0] + s[0], sum[1] + s[1]]);
+    (count > 0.0).then(|| (sum / count).sqrt())
 }
 
 /// As many windows as [`LOOKS_AT_S`] and [`LOOKS_AT_STEPS`] have room for, evenly spread, of those that the starting car drives to their
@@ -382,6 +406,17 @@ mod tests {
     use crate::vehicle::Car;
     use std::ops::ControlFlow;
     use std::sync::atomic::AtomicBool;
+
+    /// A window that one of two lists loses counts for neither.
+    #[test]
+    fn lists_are_compared_on_the_windows_that_both_drive() {
+        let one = [Some([4.0, 1.0]), Some([9.0, 1.0]), None];
+        let other = [None, Some([1.0, 1.0]), Some([100.0, 1.0])];
+        assert_eq!(super::error_over(&one, &other), Some(3.0));
+        assert_eq!(super::error_over(&other, &one), Some(1.0));
+        assert_eq!(super::error_over(&one, &one), Some(6.5f64.sqrt()));
+        assert_eq!(super::error_over(&one, &[None; 3]), None);
+    }
 
     /// A study that is stopped before anything is chosen or driven ends with the car that it began from, judged.
     #[test]
