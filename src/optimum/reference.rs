@@ -451,15 +451,12 @@ impl ReferenceSolvers {
             RoadEdges::new(&room.edges_m[0], &room.edges_m[1], fine.closed).clearances(&fine, &room.car)
         });
         // A line beyond the end of a cross-section has no room there: held at the end, it would have a kink.
-        for (room_m, (section, share)) in clearances_m.iter_mut().zip(&fine.section) {
-            if *share == 0.0 {
-                let (right, left) = (
-                    self.cross_sections.right_m[*section],
-                    self.cross_sections.left_m[*section],
-                );
-                let beyond = [-alpha[*section], alpha[*section] - 1.0];
-                for (room_m, beyond) in room_m.iter_mut().zip(beyond).filter(|(_, beyond)| *beyond > 0.0) {
-                    *room_m = room_m.min(-beyond * right.distance(left));
+        let road = &self.cross_sections;
+        for (room_m, &(section, share)) in clearances_m.iter_mut().zip(&fine.section) {
+            let inside = [alpha[section], 1.0 - alpha[section]];
+            for (room_m, inside) in room_m.iter_mut().zip(inside) {
+                if share == 0.0 && inside < 0.0 {
+                    *room_m = room_m.min(inside * road.left_m[section].distance(road.right_m[section]));
                 }
             }
         }

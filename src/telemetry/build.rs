@@ -19,7 +19,7 @@ use super::text::shown;
 use super::units::Quantity;
 use crate::{Error, Place, Result};
 
-/// Speed (m/s) up to which positions tell of no direction.
+/// Speed (m/s) up to which a heading from GPS is noise.
 const STANDING_MPS: f64 = 2.0;
 
 /// A mapped channel in SI, with its times.
@@ -105,7 +105,8 @@ fn turned(headings: &[f64]) -> Vec<f64> {
     headings.iter().map(on).collect()
 }
 
-/// The yaw rate (rad/s, to the left) that headings (rad, to the right, without jumps) tell of. A car that hardly moves has any.
+/// The yaw rate (rad/s, to the left) from headings (rad, to the right, without jumps); zero where the car hardly moves and its heading
+/// is noise.
 fn yaw_rate(log: &Log, headings: &[f64]) -> Vec<f64> {
     let change = derivative(headings, log.dt_s, acceleration_span(log)).into_iter();
     let speeds = log.vx_mps.iter();
@@ -496,10 +497,10 @@ enum Clocked {
     Resampled(Grid),
 }
 
-/// Longest pause (s) of a lap number over which the lap before goes on where the number is another one after it.
+/// Longest pause (s) between two different lap numbers that counts as part of the lap before it.
 const LAP_GAP_S: f64 = 1.0;
 
-/// Lap numbers from the values of their channel. One that is missing between two that are the same is that one.
+/// Lap numbers from the values of their channel. A number that is missing between two equal ones is that number.
 pub(super) fn lap_numbers(source: &str, channel: &Channel, values: &[f64]) -> Result<Vec<u32>> {
     // RaceChrono leaves the number out before the first line and after the last.
     let is_empty = channel.unreadable.as_ref().is_some_and(Unreadable::is_missing);

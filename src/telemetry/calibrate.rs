@@ -300,7 +300,7 @@ fn offset_at_rest(log: &Log) -> Option<Offset> {
     })
 }
 
-/// Half of the time over which a car's sideways motion comes to nothing (s).
+/// Half of the time over which a car's sideways motion nearly cancels (s).
 const SIDEWAYS_S: f64 = 2.0;
 
 /// The offset of ay over whole laps, on which the car's own sideways motion begins and ends alike: what is left beside speed times

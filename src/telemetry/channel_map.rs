@@ -59,7 +59,7 @@ pub struct ChannelMap {
     pub bridge_gaps_s: Option<f64>,
 }
 
-/// Gaps that are bridged where nothing else is said (s): a car hardly changes what it does within them.
+/// Longest gap that is bridged by default (s): the driver changes little in that time.
 const BRIDGED_S: f64 = 0.2;
 
 #[derive(Deserialize)]
@@ -218,7 +218,7 @@ impl ChannelMap {
         Some([front, self.rear_rolling_radius_m.unwrap_or(front)])
     }
 
-    /// Finds the channel of each role. That of the heading has none where the yaw rate has one.
+    /// Finds the channel of each role. A heading is left out where a yaw rate is logged.
     ///
     /// # Errors
     /// [`Error::Input`] when a channel the map names is not in the recording, a required role finds no channel, or a

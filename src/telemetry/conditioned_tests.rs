@@ -275,8 +275,8 @@ fn offsets_are_found_and_small_ones_are_left() {
     }
 }
 
-/// A driver who weaves: within two seconds, sideways motion takes three tenths of the turning off the lateral acceleration. With that
-/// taken for a part of the factor, 0.3 m/s^2 came off a log that is right.
+/// A driver who weaves: within two seconds, sideways motion takes three tenths of the turning off the lateral acceleration. Smoothed
+/// signals have an offset of -0.03 m/s^2. Those as they are have -0.10, of a log that is right.
 #[test]
 fn sideways_motion_is_no_offset() {
     let mut log = perfect();

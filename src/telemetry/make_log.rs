@@ -308,6 +308,34 @@ mod tests {
         ChannelMap::parse(text, "m.toml").unwrap()
     }
 
+    /// Headings that turn to the left by 2 t degrees per second, past north: the gyro's 2 t, where differences are central.
+    #[test]
+    fn a_heading_tells_the_yaw_rate() {
+        let mut recording = mixed();
+        let gyro = recording
+            .channels
+            .iter()
+            .position(|c| c.name == "Gyro Yaw Velocity");
+        recording.channels[gyro.unwrap()] =
+            channel("GPS Heading", "deg", 50.0, |t| (30.0 - t * t).rem_euclid(360.0));
+        let map = map("[vehicle]\nsteering_ratio = 10\nrolling_radius_m = 0.5");
+        let log = Log::from_recording(&recording, &map, &off()).unwrap();
+        for i in [50, 400, 700] {
+            let expected = (2.0 * log.time_s[i]).to_radians();
+            assert!(
+                (log.yaw_rate_radps[i] - expected).abs() < 1e-9,
+                "{i}: {}",
+                log.yaw_rate_radps[i]
+            );
+        }
+        let notes = &log.calibration.notes;
+        assert!(
+            notes
+                .iter()
+                .any(|n| n.contains("change of the heading stands in"))
+        );
+    }
+
     #[test]
     fn channels_of_different_rates_meet_on_the_fastest() {
         let map = map("[vehicle]\nsteering_ratio = 10\nrolling_radius_m = 0.5");

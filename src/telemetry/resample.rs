@@ -83,8 +83,8 @@ pub(super) fn check_times(source: &str, channel: &Channel, times: &[f64], bridge
                 channel.place(at + 1),
                 format!("a gap of {interval:.3} s after t = {:.3} s", pair[0]),
                 format!(
-                    "samples every {nominal:.4} s and gaps of up to {bridged_s} s, which bridge_gaps_s in the channel map \
-                     changes"
+                    "samples every {nominal:.4} s, with gaps of up to {bridged_s} s; bridge_gaps_s in the channel map allows \
+                     longer ones"
                 ),
             ));
         }

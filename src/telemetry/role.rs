@@ -360,7 +360,7 @@ impl Role {
         }
     }
 
-    /// What names of it have in them, where their unit is one of the role's and no other such name has.
+    /// A part of its names: a channel that has it in its name is found if the unit fits and there is no second one.
     pub(super) fn part_of_names(self) -> Option<&'static str> {
         match self {
             Self::Steer => Some("steer"),
