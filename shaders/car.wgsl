@@ -8,6 +8,7 @@ struct CarInput {
     wheel_speed: vec4<f32>,
     steer: f32,
     flap: f32,
+    friction: f32,
 }
 
 struct CarState {
@@ -94,10 +95,13 @@ struct AllForces {
     moment: vec4<f32>,
 }
 
-// Forces in the body's axes, and moments about the centre of gravity.
-fn forces_of_some(tyres: Tyre, body: BodyState, least_speed: f32, at: SomeWheels) -> WheelForces {
+// Forces in the body's axes, and moments about the centre of gravity; on a road with this share of the tyres' own friction. Twin of
+// `axle_forces_on`: compilers drop what a friction of 1 does.
+fn forces_of_some(tyres: Tyre, body: BodyState, least_speed: f32, friction: f32, at: SomeWheels) -> WheelForces {
     let slip = wheel_slip(body, at.x, at.y, at.cosine, at.sine, at.rim_speed, least_speed);
-    let forces = tyre_forces(tyres, TyreInput(at.load, slip.ratio, slip.tangent, at.side));
+    let inverse = 1.0 / friction;
+    let own = tyre_forces(tyres, TyreInput(at.load, slip.ratio * inverse, slip.tangent * inverse, at.side));
+    let forces = TyreForces(own.x * friction, own.y * friction, own.aligning_moment * friction);
     let x = forces.x * at.cosine - forces.y * at.sine;
     let y = forces.x * at.sine + forces.y * at.cosine;
     return WheelForces(x, y, at.x * y - at.y * x + forces.aligning_moment);
@@ -131,7 +135,7 @@ fn car_rate(car: CarModel, state: CarState, input: CarInput) -> CarRate {
     let y = half_track * side;
 
     let rim_speed = input.wheel_speed * radius;
-    let forces = forces_of_all(car, body, AllWheels(loads, rim_speed, x, y, side, cosine, sine));
+    let forces = forces_of_all(car, body, input.friction, AllWheels(loads, rim_speed, x, y, side, cosine, sine));
     let total = BodyForces(
         with_all(-aero.drag, forces.x),
         with_all(0.0, forces.y),

@@ -13,7 +13,7 @@ fn chassis_of(car: CarModel) -> Chassis {
     return load_chassis(car.candidate);
 }
 
-fn forces_of_all(car: CarModel, body: BodyState, all: AllWheels) -> AllForces {
+fn forces_of_all(car: CarModel, body: BodyState, friction: f32, all: AllWheels) -> AllForces {
     let least_speed = chassis_of(car).slip_speed_floor;
     let at_front = SomeWheels(
         all.load.xy,
@@ -24,7 +24,7 @@ fn forces_of_all(car: CarModel, body: BodyState, all: AllWheels) -> AllForces {
         all.cosine.xy,
         all.sine.xy,
     );
-    let front = forces_of_some(load_front_tyres(car.candidate), body, least_speed, at_front);
+    let front = forces_of_some(load_front_tyres(car.candidate), body, least_speed, friction, at_front);
     let at_rear = SomeWheels(
         all.load.zw,
         all.rim_speed.zw,
@@ -34,7 +34,7 @@ fn forces_of_all(car: CarModel, body: BodyState, all: AllWheels) -> AllForces {
         all.cosine.zw,
         all.sine.zw,
     );
-    let rear = forces_of_some(load_rear_tyres(car.candidate), body, least_speed, at_rear);
+    let rear = forces_of_some(load_rear_tyres(car.candidate), body, least_speed, friction, at_rear);
     return AllForces(
         vec4<f32>(front.x, rear.x),
         vec4<f32>(front.y, rear.y),

@@ -15,10 +15,10 @@ fn chassis_of(car: CarModel) -> Chassis {
     return car.chassis;
 }
 
-fn forces_of_all(car: CarModel, body: BodyState, all: AllWheels) -> AllForces {
+fn forces_of_all(car: CarModel, body: BodyState, friction: f32, all: AllWheels) -> AllForces {
     let least_speed = car.chassis.slip_speed_floor;
     let at = SomeWheels(all.load, all.rim_speed, all.x, all.y, all.side, all.cosine, all.sine);
-    let forces = forces_of_some(car.tyres, body, least_speed, at);
+    let forces = forces_of_some(car.tyres, body, least_speed, friction, at);
     return AllForces(forces.x, forces.y, forces.moment);
 }
 

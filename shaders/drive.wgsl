@@ -64,14 +64,14 @@ fn drive_step(car: CarModel, course: Course, pace: Pace, number: f32, before: Dr
         return state;
     }
 
-    var under = Footing(0.0, 0.0, 0.0);
+    var under = Footing(0.0, 0.0, 0.0, 1.0);
     if HAS_RELIEF {
         under = footing(course, view, before.car.body.vx);
     }
     // Generated: the car with the gravity that its wheels feel.
     let loaded = under_load(car, under.load);
     var controls = act(course, pace, chassis_of(loaded), before.car, view, under, before.controls);
-    let input = car_input(chassis_of(loaded), before.car, controls, view.row.flap);
+    let input = car_input(chassis_of(loaded), before.car, controls, view.row.flap, under.friction);
     var next = before.car;
     var reached = before.car;
     for (var stage = 0u; stage < STAGES; stage++) {

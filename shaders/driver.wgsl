@@ -94,7 +94,7 @@ fn act(
     let wheelbase = c.cg_to_front + c.cg_to_rear;
     let aero = aero_forces(c, v, view.row.flap);
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
-    let grip = driver.friction * weight / c.mass;
+    let grip = under.friction * driver.friction * weight / c.mass;
     let curvature = curvature_ahead(course, view.pose, driver.preview * v);
     let bend = view.bend;
     var across_ahead = curvature * v * v;
@@ -126,7 +126,7 @@ fn act(
     }
     let used = min(driver.knows * abs(turning / grip), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
-    let limit = driver.slip_limit * left;
+    let limit = under.friction * driver.slip_limit * left;
     let stiffness = driver.driven_share * weight * driver.slip_stiffness;
     let pedal = select(controls.rear_slip, controls.front_slip, controls.rear_slip < 0.0);
     let slip = pedal + c.mass * (wanted - controls.gain) / stiffness;
@@ -148,12 +148,13 @@ fn act(
     );
 }
 
-fn car_input(c: Chassis, state: CarState, controls: Controls, flap: f32) -> CarInput {
+fn car_input(c: Chassis, state: CarState, controls: Controls, flap: f32, friction: f32) -> CarInput {
     let cosine = own_cos(Wheels(controls.steer)).x;
     let sine = own_sin(Wheels(controls.steer)).x;
     return CarInput(
         wheel_speeds(c, state.body, cosine, sine, controls.front_slip, controls.rear_slip),
         controls.steer,
         select(flap, 0.0, controls.rear_slip < 0.0),
+        friction,
     );
 }

@@ -6,9 +6,10 @@
 // CORNER_ROWS, ELLIPSE_ROWS, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, HAS_RELIEF, LOADS, LOADS_AT, LOAD_STEP,
 // WORKGROUP and TILE are generated, and
 // so are the bindings 1 to 4: `sections`; `envelope` in rows of lateral, grip, drive, drag at their start and then of their rises,
-// behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open. On a road in three dimensions the
-// same again from LOADS_AT on, under each of LOADS loads, LOAD_STEP rows apart; behind the sections then stand as many whose weights
-// are height and banking: `step_rise`, `across_rise`, sine and cosine. Then `corners` and `ellipse` in rows of a figure and its rise.
+// behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open. On a road that is not level and dry
+// the same again from LOADS_AT on, under each of LOADS loads, LOAD_STEP rows apart; behind the sections then stand as many whose
+// weights are height and banking: `step_rise`, `across_rise`, sine and cosine, and whose `step` is the friction at the right end and
+// what it gains to the left. Then `corners` and `ellipse` in rows of a figure and its rise.
 // All lanes read the same section, so these tables are uniform buffers if they fit. The envelope is one only on drivers that let
 // lanes read different rows at full speed.
 
@@ -51,8 +52,8 @@ struct Section {
 
 @group(0) @binding(0) var<uniform> stretch: LineStretch;
 @group(0) @binding(5) var<storage, read> variables: array<f32>;
-// Length of the segment and curvature, section by section. On a road in three dimensions two more planes follow: curvature square to
-// the surface and gravity along the segment, then gravity to the left and square to the surface.
+// Length of the segment and curvature, section by section. On a road that is not level and dry three more planes follow: curvature
+// square to the surface and gravity along the segment, then gravity to the left and square to the surface, then the friction.
 @group(0) @binding(6) var<storage, read_write> course: array<vec2<f32>>;
 @group(0) @binding(7) var<storage, read_write> speeds_squared: array<f32>;
 // Planes of length, squared length, squared second differences, integral and time.
@@ -184,6 +185,12 @@ fn crossing(section: u32, candidate: u32) -> vec3<f32> {
     return vec3<f32>(share * sections[section].across, share * relief.y);
 }
 
+// Friction where a line crosses a cross-section.
+fn friction_at(section: u32, candidate: u32) -> f32 {
+    let friction = sections[stretch.sections + section].step;
+    return friction.x + alpha(section, variables_of(section, candidate)) * friction.y;
+}
+
 // A segment's direction in space and its length.
 struct Rising {
     direction: vec3<f32>,
@@ -243,6 +250,7 @@ fn relieve(candidate: u32) {
         course[place_of(i, candidate)] = vec2<f32>(rising.length, found.x);
         course[relief_at(1u, i, candidate)] = vec2<f32>(found.y, climb);
         course[relief_at(2u, i, candidate)] = found.zw;
+        course[relief_at(3u, i, candidate)].x = friction_at(i, candidate);
         before = rising;
         here = next;
     }
@@ -258,9 +266,10 @@ fn copy_relief(end: u32, inner: u32, segment: u32, candidate: u32) {
     let climb = course[relief_at(1u, segment, candidate)].y;
     course[relief_at(1u, end, candidate)] = vec2<f32>(course[relief_at(1u, inner, candidate)].x, climb);
     course[relief_at(2u, end, candidate)] = course[relief_at(2u, inner, candidate)];
+    course[relief_at(3u, end, candidate)].x = friction_at(end, candidate);
 }
 
-// The two planes of a road in three dimensions behind the first.
+// The planes of a road that is not level and dry behind the first.
 fn relief_at(plane: u32, section: u32, candidate: u32) -> u32 {
     return plane * stretch.stride * stretch.sections + place_of(section, candidate);
 }
@@ -272,11 +281,12 @@ struct Ground {
     climb: f32,
     lean: f32,
     press: f32,
+    friction: f32,
 }
 
 // A bend of a level road.
 fn level(curvature: f32) -> Ground {
-    return Ground(curvature, 0.0, 0.0, 0.0, 0.0);
+    return Ground(curvature, 0.0, 0.0, 0.0, 0.0, 1.0);
 }
 
 // A section with the segment after it.
@@ -292,12 +302,13 @@ fn spot_at(section: u32, candidate: u32) -> Spot {
     }
     let second = course[relief_at(1u, section, candidate)];
     let third = course[relief_at(2u, section, candidate)];
-    return Spot(first.x, Ground(first.y, second.x, second.y, third.x, third.y));
+    let friction = course[relief_at(3u, section, candidate)].x;
+    return Spot(first.x, Ground(first.y, second.x, second.y, third.x, third.y, friction));
 }
 
 // The ground at the end of a segment, of which it has the climb.
 fn end_of(segment: Spot, end: Ground) -> Ground {
-    return Ground(end.bend, end.dip, segment.ground.climb, end.lean, end.press);
+    return Ground(end.bend, end.dip, segment.ground.climb, end.lean, end.press, end.friction);
 }
 
 fn half_way(here: Ground, there: Ground) -> Ground {
@@ -311,6 +322,7 @@ fn half_way(here: Ground, there: Ground) -> Ground {
         here.climb,
         0.5 * (here.lean + there.lean),
         0.5 * (here.press + there.press),
+        0.5 * (here.friction + there.friction),
     );
 }
 
@@ -352,8 +364,8 @@ fn loaded_lateral(ground: Ground, speed_squared: f32) -> vec2<f32> {
     let here = loaded_row(layer, row, 0u);
     let by_load = ((high.figures.x + beyond * high.rises.x) - (low.figures.x + beyond * low.rises.x)) * stretch.tables_per_load;
     return vec2<f32>(
-        max(here.figures.x + beyond * here.rises.x, LEAST_GRIP),
-        here.rises.x * per_row + by_load * ground.dip,
+        max(ground.friction * (here.figures.x + beyond * here.rises.x), LEAST_GRIP),
+        ground.friction * (here.rises.x * per_row + by_load * ground.dip),
     );
 }
 
@@ -398,7 +410,8 @@ fn limits_at(speed_squared: f32, ground: Ground, table: u32) -> vec4<f32> {
     if HAS_RELIEF {
         let under = loaded_row(layer_of(ground, speed_squared), row, table);
         let limits = under.figures + (held - f32(row)) * under.rises;
-        return vec4<f32>(max(limits.x, LEAST_GRIP), max(limits.y, LEAST_GRIP), limits.z, limits.w);
+        let of_tyres = max(ground.friction * limits.xy, vec2<f32>(LEAST_GRIP));
+        return vec4<f32>(of_tyres, limits.z, limits.w);
     }
     return envelope[table + 2u * row] + (held - f32(row)) * envelope[table + 2u * row + 1u];
 }
@@ -440,7 +453,8 @@ fn left_for_driving(speed_squared: f32, root: f32, ground: Ground, table: u32) -
         let low = traction_in(below, beyond);
         let high = traction_in(below + LOAD_STEP, beyond);
         // Beyond the loads that were swept the tyres give nothing back.
-        return max(low + layer.y * (high - low), vec2<f32>(0.0));
+        let both = max(low + layer.y * (high - low), vec2<f32>(0.0));
+        return vec2<f32>(both.x, ground.friction * ground.friction * both.y);
     }
     return traction_in(place, beyond);
 }

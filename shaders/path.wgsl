@@ -1,8 +1,9 @@
 // Twin of `src/drive/path.rs`: the path that is followed, in the frame of its samples, and the car's place relative to it.
 // The constants ROWS_AHEAD, CELLS_AHEAD, BLENDS, HAS_RELIEF and RELIEF_AT are generated.
 
-// Three vectors for each row of the path: the figures of `PathRow` in its order. From RELIEF_AT on, on roads in three dimensions, one
-// more for each row: gravity along, across and square to the road, and the curvature square to it.
+// Three vectors for each row of the path: the figures of `PathRow` in its order. From RELIEF_AT on, on roads that are not
+// level and dry, two more for each row: gravity along, across and square to the road, and the curvature square to it; then the friction
+// and what it gains per metre to the left.
 @group(0) @binding(4) var<storage, read> path: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read> plans: array<f32>;
 @group(0) @binding(6) var<storage, read> courses: array<Course>;
@@ -161,18 +162,21 @@ struct Footing {
     climb: f32,
     lean: f32,
     load: f32,
+    friction: f32,
 }
 
 fn footing(course: Course, view: View, speed: f32) -> Footing {
-    let at = RELIEF_AT + place_of_number(course.path_at + view.pose.row);
+    let at = RELIEF_AT + 2u * place_of_number(course.path_at + view.pose.row);
     let share = view.pose.along * course.per_metre;
     let here = path[at];
-    let row = here + share * (path[at + 1u] - here);
+    let row = here + share * (path[at + 2u] - here);
+    let friction = path[at + 1u].xy + share * (path[at + 3u].xy - path[at + 1u].xy);
     let load = row.z + speed * speed * row.w;
     return Footing(
         row.x + view.heading_error * row.y,
         row.y - view.heading_error * row.x,
         max(load, 0.5),
+        max(friction.x + view.offset * friction.y, 0.05),
     );
 }
 

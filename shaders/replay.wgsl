@@ -33,6 +33,7 @@ fn input_between(a: Sample, b: Sample, fraction: f32) -> CarInput {
         a.wheel_speed + fraction * (b.wheel_speed - a.wheel_speed),
         a.steer + fraction * (b.steer - a.steer),
         a.flap + fraction * (b.flap - a.flap),
+        1.0,
     );
 }
 

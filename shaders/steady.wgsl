@@ -66,6 +66,7 @@ fn settle_rate(car: CarModel, speed: f32, steer: f32, now: Figures) -> SettleRat
         wheel_speeds(c, body, cosine, sine, 0.0, now.slip),
         (steer - c.steer_offset) / c.steer_scale,
         0.0,
+        1.0,
     );
     let rate = car_rate(car, state, input).state;
     let lag = rate.pitch_acceleration * c.pitch_lag;

@@ -5,6 +5,8 @@ mod draw;
 mod log;
 mod tyres;
 
+pub use draw::draw_bundled;
+
 use crate::cli::output::{errln, outln};
 use lapswarm::config::{Document, read_start, read_text};
 use lapswarm::line::read_line;
@@ -102,12 +104,21 @@ static TRACK: FileKind = file("track", "a track", |path| {
     ))
 });
 
-/// Height and banking of a circuit in words; nothing of a level one.
+/// Height, banking and friction of a circuit in words; nothing of a level and dry one.
 fn relief_in_words(circuit: &Circuit) -> String {
     let (Some(relief), Some(facts)) = (&circuit.relief, circuit.relief_facts()) else {
         return String::new();
     };
     let change = &relief.change;
+    let friction = if relief.is_dry() {
+        String::new()
+    } else {
+        let [least, most] = facts.friction;
+        format!("\n  friction {least:.2} to {most:.2} of the car's own")
+    };
+    if relief.is_level() {
+        return friction;
+    }
     let mut text = format!(
         "\n  climbs {:.1} m a lap, {:.1} m between its lowest and its highest point; steepest {:.1}% at {:.0} m; banked {:.1} degrees \
          at the most, at {:.0} m\n  smoothing changed its height by {:.2} m at the most ({:.2} m rms), its banking by {:.2} degrees",
@@ -127,7 +138,7 @@ fn relief_in_words(circuit: &Circuit) -> String {
             change.gap_m
         );
     }
-    text
+    text + &friction
 }
 
 static LOG: FileKind = file("log", "a log", |path| {

@@ -1,5 +1,6 @@
 //! `lapswarm reproduce`.
 
+use super::check::draw_bundled;
 use super::study::{Resume, print_plan, print_results};
 use super::sweep::verdict;
 use super::{Common, Memory, backend_flag, progress::Bar, stop_flag, stopped, to_json};
@@ -17,7 +18,7 @@ use lapswarm::study::reproduce::{
 #[command(
     after_help = "Examples:\n  lapswarm reproduce --quick\n  lapswarm reproduce --chapter 7 --out chapter7\n  lapswarm \
                   reproduce --out thesis\n  lapswarm reproduce --out thesis --resume\n\nEach table has a folder of its own in the \
-                  run folder, with the page of its study."
+                  run folder, with the page of its study. Curves of tyres and cars have one, too."
 )]
 pub struct Arguments {
     /// A chapter, 2 to 7; may be repeated [default: all]
@@ -79,6 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 bar.show(progress);
                 stopped(&stop)
             },
+            draw: &|drawing, folder| draw_bundled(&drawing.car, drawing.tyres, folder),
         },
     );
     bar.finish();

@@ -348,7 +348,8 @@ pub fn act<R: Lookup>(
     let pose = &view.pose;
     let aero = aero_forces(c, v, view.row.flap);
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
-    let grip = R::load(driver.friction) * weight / c.mass;
+    let friction = footing.map_or(one, |footing| footing.friction);
+    let grip = friction * R::load(driver.friction) * weight / c.mass;
     // Feed-forward: geometry plus the slip of both axles in steady cornering; feedback: offset, heading and the yaw rate that the
     // present curvature asks for.
     let curvature = curvature_ahead(path, course, pose, R::load(driver.preview) * v);
@@ -393,7 +394,7 @@ pub fn act<R: Lookup>(
     let used = knows * (turning / grip).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
-    let limit = R::load(driver.slip_limit) * left;
+    let limit = friction * R::load(driver.slip_limit) * left;
     // The foot moves until the car gains what is wanted. How much slip that takes, the tyres know and the driver does not: he goes no
     // further than soft tyres would need, or he would spin the wheels of a car that gains no more.
     let stiffness = R::load(driver.driven_share) * weight * R::load(driver.slip_stiffness);
@@ -424,18 +425,21 @@ pub fn act<R: Lookup>(
     }
 }
 
-/// The wheel speeds and the steering that the controls ask for, and the DRS: open where the path says so, shut on the brakes.
+/// The wheel speeds and the steering that the controls ask for, and the DRS: open where the path says so, shut on the brakes; on a road
+/// of this friction.
 #[inline(always)]
 pub fn car_input<R: Real>(
     c: &Chassis<R>,
     state: &CarState<R>,
     controls: &Controls<R>,
     flap: R,
+    friction: Option<R>,
 ) -> CarInput<R> {
     let turned = (controls.steer.cos(), controls.steer.sin());
     CarInput {
         wheel_speed: wheel_speeds(c, &state.body, turned, [controls.front_slip, controls.rear_slip]),
         steer: controls.steer,
         flap: R::select(controls.rear_slip.less_than(R::lit(0.0)), R::lit(0.0), flap),
+        friction,
     }
 }

@@ -237,7 +237,8 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
         (&before.car, &view, footing.as_ref()),
         &before.controls,
     );
-    let input = car_input(&car.chassis, &before.car, &controls, view.row.flap);
+    let friction = footing.map(|footing| footing.friction);
+    let input = car_input(&car.chassis, &before.car, &controls, view.row.flap, friction);
     watch(&Moment {
         car: &before.car,
         view: &view,

@@ -1,7 +1,7 @@
 //! The speed that the driver aims for: a forward and a backward pass under a friction ellipse (the book, chapter Model,
 //! section 5, in first-order form; a driver needs no better).
 
-use super::relief::row_of;
+use super::relief::{RELIEF_WIDTH, row_of};
 use crate::track::Circuit;
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::{Car, Chassis, Tyres};
@@ -27,6 +27,8 @@ pub(super) fn load_mps2(c: &Chassis<f64>, speed: f64) -> f64 {
 }
 
 /// Estimates of what the car can do at a speed: lateral and longitudinal grip, drive and drag, all in m/s^2.
+type Row = [f64; RELIEF_WIDTH];
+
 struct TyreEnvelope<'a> {
     car: &'a Car,
     friction: f64,
@@ -34,11 +36,11 @@ struct TyreEnvelope<'a> {
 
 impl TyreEnvelope<'_> {
     /// On a row of the road, see [`row_of`].
-    fn grip(&self, speed: f64, [_, _, press, dip]: [f64; 4]) -> f64 {
+    fn grip(&self, speed: f64, [_, _, press, dip, friction, ..]: Row) -> f64 {
         let c = &self.car.chassis;
         let aero = aero_forces(c, speed, 0.0);
         let load = press + speed * speed * dip + (aero.downforce_front + aero.downforce_rear) / c.mass;
-        self.friction * load.max(0.0)
+        friction * self.friction * load.max(0.0)
     }
 
     fn drag(&self, speed: f64, flap: f64) -> f64 {
@@ -54,13 +56,13 @@ impl TyreEnvelope<'_> {
         }
     }
 
-    /// The row of a level road.
-    fn level(&self) -> [f64; 4] {
-        [0.0, 0.0, self.car.chassis.gravity, 0.0]
+    /// The row of a level and dry road.
+    fn level(&self) -> Row {
+        [0.0, 0.0, self.car.chassis.gravity, 0.0, 1.0, 0.0, 0.0, 0.0]
     }
 
     /// What the ellipse leaves for the longitudinal direction at a curvature.
-    fn remaining(&self, speed: f64, curvature: f64, row: [f64; 4]) -> f64 {
+    fn remaining(&self, speed: f64, curvature: f64, row: Row) -> f64 {
         let grip = self.grip(speed, row);
         if grip <= 0.0 {
             return 0.0;
@@ -70,7 +72,7 @@ impl TyreEnvelope<'_> {
     }
 
     /// The greatest speed (m/s) up to `top` at a curvature.
-    fn corner(&self, curvature: f64, top: f64, row: [f64; 4]) -> f64 {
+    fn corner(&self, curvature: f64, top: f64, row: Row) -> f64 {
         if row[1] == 0.0 && row[3] == 0.0 {
             // Grip grows with speed, so the corner speed is a fixed point; a few rounds settle it.
             let mut v = top;
@@ -124,7 +126,7 @@ impl SpeedPlan {
                 None => envelope.level(),
             }
         };
-        let rows: Vec<[f64; 4]> = (0..count).map(row).collect();
+        let rows: Vec<Row> = (0..count).map(row).collect();
         let places = curvature.iter().zip(&rows);
         let mut speed_mps: Vec<f64> = places
             .map(|(k, row)| envelope.corner(*k, top_speed, *row))

@@ -1,8 +1,9 @@
-//! The road under a car that is driven: its load, and the parts of gravity along and across it. Twin of the same functions in
-//! `shaders/path.wgsl`.
+//! The road under a car that is driven: its load, the parts of gravity along and across it, and its friction. Twin of the same
+//! functions in `shaders/path.wgsl`.
 //!
 //! The car stands on the road's surface. Its wheels carry `f_N = v^2 k_n + g e_z.N`, as if gravity were that strong, and gravity
 //! pulls at its body by `g e_z.T` backwards and `g e_z.L` to the right. How the road's own pitch and roll turn the body is left out.
+//! The friction is that under the car's middle; all wheels have it.
 
 use super::path::View;
 use super::road::Course;
@@ -11,11 +12,13 @@ use crate::track::Circuit;
 use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::{CarModel, Chassis};
 
-/// Figures of a row of the table of height and banking: gravity along and across the path and square to its surface (m/s^2), and
-/// curvature square to the surface (1/m).
-pub const RELIEF_WIDTH: usize = 4;
+/// Figures of a row of the table of surfaces: gravity along and across the path and square to its surface (m/s^2), curvature square to
+/// the surface (1/m), friction on the path as a share of the car's own and what it gains per metre to the left (1/m); two are spare.
+pub const RELIEF_WIDTH: usize = 8;
 /// Samples to either side from which gradient and curvature are taken: three metres, about a wheelbase.
 const REACH: usize = 3;
+/// Least friction, far off the path on a road that loses it sideways.
+const LEAST_FRICTION: f64 = 0.05;
 /// Least load over mass of a car that a crest lifts off the road (m/s^2). A driver divides by it.
 const LEAST_LOAD: f64 = 0.5;
 
@@ -28,12 +31,14 @@ pub struct Footing<R> {
     pub lean: R,
     /// Load over mass (m/s^2).
     pub load: R,
+    /// Friction as a share of the car's own.
+    pub friction: R,
 }
 
-/// The row of a sample of a circuit in three dimensions; of a level one that of the plane.
+/// The row of a sample of a circuit; of a level and dry one that of the plane.
 pub(super) fn row_of(circuit: &Circuit, sample: usize) -> [f64; RELIEF_WIDTH] {
     let Some(relief) = &circuit.relief else {
-        return [0.0, 0.0, GRAVITY_MPS2, 0.0];
+        return [0.0, 0.0, GRAVITY_MPS2, 0.0, 1.0, 0.0, 0.0, 0.0];
     };
     let n = relief.z_m.len();
     let reach_m = REACH as f64 * circuit.spacing_m();
@@ -44,11 +49,16 @@ pub(super) fn row_of(circuit: &Circuit, sample: usize) -> [f64; RELIEF_WIDTH] {
     let bow = (after - 2.0 * here + before) / (reach_m * reach_m) * level.powi(3);
     let (sin, cos) = relief.bank_rad[sample].sin_cos();
     let turn = level * level * circuit.curvature_1pm[sample];
+    let [friction, per_m] = relief.friction[sample];
     [
         GRAVITY_MPS2 * slope * level,
         GRAVITY_MPS2 * level * sin,
         GRAVITY_MPS2 * level * cos,
         bow * cos - turn * sin,
+        friction,
+        per_m,
+        0.0,
+        0.0,
     ]
 }
 
@@ -58,7 +68,7 @@ pub fn footing<R: Lookup>(table: &[R::Storage], course: &Course<R>, view: &View<
     let number = course.path_at + view.pose.row;
     let (place, _) = number.place(table.len() / RELIEF_WIDTH, RELIEF_WIDTH);
     let share = view.pose.along * course.per_metre;
-    let [climb, lean, press, dip] = [0, 1, 2, 3].map(|column| {
+    let [climb, lean, press, dip, friction, per_m] = [0, 1, 2, 3, 4, 5].map(|column| {
         let here = R::pick(table, place, column);
         here + share * (R::pick(table, place, RELIEF_WIDTH + column) - here)
     });
@@ -68,6 +78,7 @@ pub fn footing<R: Lookup>(table: &[R::Storage], course: &Course<R>, view: &View<
         climb: climb + view.heading_error * lean,
         lean: lean - view.heading_error * climb,
         load: load.max(R::lit(LEAST_LOAD)),
+        friction: (friction + view.offset * per_m).max(R::lit(LEAST_FRICTION)),
     }
 }
 

@@ -33,7 +33,7 @@ pub const PATH_WIDTH: usize = 12;
 pub struct Road<S> {
     /// Rows of [`super::Row`] of all lines, one line after the other.
     pub path: Vec<S>,
-    /// Rows of height and banking, one for each of the path; empty where all lines are level.
+    /// Rows of surfaces, one for each of the path; empty where all lines are level and dry.
     pub relief: Vec<S>,
     /// Planned speeds (m/s), line by line, share by share.
     pub plans: Vec<S>,

@@ -72,7 +72,7 @@ impl FineLine {
             relief: None,
         };
         let mut at = 0;
-        let (mut z_m, mut bank_rad) = (Vec::new(), Vec::new());
+        let mut surfaces = Vec::new();
         for station in &circuit.station_m {
             while at + 1 < n && self.station_m[at + 1] <= *station {
                 at += 1;
@@ -91,15 +91,14 @@ impl FineLine {
                 .curvature_1pm
                 .push(mix(self.curvature_1pm[at], self.curvature_1pm[next]));
             if let Some(relief) = &self.relief {
-                z_m.push(mix(relief.z_m[at], relief.z_m[next]));
-                bank_rad.push(mix(relief.bank_rad[at], relief.bank_rad[next]));
+                let (here, there) = (relief.surface[at], relief.surface[next]);
+                surfaces.push(std::array::from_fn(|k: usize| mix(here[k], there[k])));
             }
         }
-        circuit.relief = self.relief.as_ref().map(|_| Relief {
-            z_m,
-            bank_rad,
-            change: ReliefChange::default(),
-        });
+        circuit.relief = self
+            .relief
+            .as_ref()
+            .map(|_| Relief::of(surfaces.into_iter(), ReliefChange::default()));
         let edges = RoadEdges::new(&edges_m[0], &edges_m[1], true);
         let abreast = edges.abreast(&circuit.centreline_m);
         let room = |left: bool| -> Vec<f64> {

@@ -6,6 +6,7 @@ use super::profile::{LapProfile, lap_profile_on};
 use super::relief::LineRelief;
 use super::spline::Spline;
 use crate::error::{Error, Place, Result};
+use crate::track::Surface;
 use glam::DVec2;
 
 /// Distance between the points of the fine spline that lines are reported on (m).
@@ -34,7 +35,7 @@ pub struct FineLine {
     pub integral_kappa2_1pm: f64,
     /// The lap, if a car was given.
     pub lap: Option<LapProfile>,
-    /// Height and banking of a line on a road in three dimensions. All other figures but the lap's are those of the plan view.
+    /// The surface under a line on a road that is not level and dry. All other figures but the lap's are those of the plan view.
     pub relief: Option<LineRelief>,
 }
 
@@ -55,13 +56,13 @@ impl FineLine {
         Self::on(points_m, None, closed, spacing_m, car, entry_mps)
     }
 
-    /// As [`FineLine::new`], on a road in three dimensions with height (m) and banking (rad) at each of the points.
+    /// As [`FineLine::new`], on a road that is not level and dry, with the surface at each of the points.
     ///
     /// # Errors
     /// As [`FineLine::new`].
     pub fn on(
         points_m: &[DVec2],
-        relief: Option<&[[f64; 2]]>,
+        relief: Option<&[Surface]>,
         closed: bool,
         spacing_m: f64,
         car: Option<(&PointMass, &[bool])>,

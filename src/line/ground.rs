@@ -4,7 +4,8 @@
 //! The line's own frame on the road is T forward, L left and N up from the surface. With `dT/ds = k_g L + k_n N` the specific forces
 //! of the tyres are `f_T = dv/dt + g e_z.T`, `f_L = v^2 k_g + g e_z.L` and `f_N = v^2 k_n + g e_z.N` (D. J. N. Limebeer, G. Perantoni,
 //! *Optimal control of a Formula One car on a three-dimensional track, part 2*, J. Dyn. Sys., Meas., Control 137, 2015). Limits are those
-//! of the load `f_N`, of which [`EnvelopeTable::loads`] has several.
+//! of the load `f_N`, of which [`EnvelopeTable::loads`] has several. What tyres can do goes with the friction of the road; what they take
+//! from the drive in a bend goes with its square, since their slip angles go with it, too.
 
 use super::kernel::{Course, alpha, look_up};
 use super::loads::LoadTables;
@@ -119,6 +120,8 @@ pub struct Sloped<R> {
     pub lean: R,
     /// and along N.
     pub press: R,
+    /// Friction as a share of the car's own.
+    pub friction: R,
 }
 
 /// Where a load lies between two of the tables of limits.
@@ -208,10 +211,11 @@ impl<R: Lookup> Sloped<R> {
         let figure = low[0] + layer.share * (high[0] - low[0]);
         let rise = low[1] + layer.share * (high[1] - low[1]);
         let by_load = (high[0] + beyond * high[1]) - (low[0] + beyond * low[1]);
+        let slope = rise * R::load(envelope.rows_per_speed_squared)
+            + by_load * R::load(envelope.loads.per_load) * self.dip;
         [
-            (figure + beyond * rise).max(R::lit(LEAST_GRIP)),
-            rise * R::load(envelope.rows_per_speed_squared)
-                + by_load * R::load(envelope.loads.per_load) * self.dip,
+            (self.friction * (figure + beyond * rise)).max(R::lit(LEAST_GRIP)),
+            self.friction * slope,
         ]
     }
 }
@@ -227,6 +231,7 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
             climb: self.climb,
             lean: half * (self.lean + there.lean),
             press: half * (self.press + there.press),
+            friction: half * (self.friction + there.friction),
         }
     }
 
@@ -235,10 +240,10 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
         let row = Self::row_of(envelope, speed_squared);
         let layer = self.layer(&envelope.loads, speed_squared);
         let least = R::lit(LEAST_GRIP);
-        let lateral = Self::figure(envelope, layer, row, 0).max(least);
+        let lateral = (self.friction * Self::figure(envelope, layer, row, 0)).max(least);
         let limits = [
             lateral,
-            Self::figure(envelope, layer, row, 1).max(least),
+            (self.friction * Self::figure(envelope, layer, row, 1)).max(least),
             Self::figure(envelope, layer, row, 2),
             Self::figure(envelope, layer, row, 3),
         ];
@@ -255,7 +260,8 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
         let low = Self::traction_of(loads, layer.below, cell, beyond);
         let high = Self::traction_of(loads, layer.below + R::lit(1.0), cell, beyond);
         // Beyond the loads that were swept the tyres give nothing back.
-        std::array::from_fn(|i: usize| (low[i] + layer.share * (high[i] - low[i])).max(R::lit(0.0)))
+        let [left, lost] = [0, 1].map(|i| (low[i] + layer.share * (high[i] - low[i])).max(R::lit(0.0)));
+        [left, self.friction * self.friction * lost]
     }
 
     /// Where the lateral limit is passed: by Newton's method from above, which bisection helps where it leaves what is known.
@@ -327,13 +333,14 @@ impl<R: Lookup> Grounds<R> for SlopedRoad {
 
     #[inline(always)]
     fn at(course: &Course<R>, section: usize, segment: usize) -> Sloped<R> {
-        let [dip, _, lean, press] = course.relief[section];
+        let [dip, _, lean, press, friction] = course.relief[section];
         Sloped {
             bend: course.curvature[section],
             dip,
             climb: course.relief[segment][1],
             lean,
             press,
+            friction,
         }
     }
 }
@@ -397,6 +404,14 @@ fn crossing<R: Real>(plan: &LinePlan<R::Storage>, i: usize, variables: &[R]) -> 
     ]
 }
 
+/// Friction where a line crosses cross-section `i`, as a share of the car's own.
+#[inline(always)]
+fn friction<R: Real>(plan: &LinePlan<R::Storage>, i: usize, variables: &[R]) -> R {
+    let share = alpha(&plan.rows[i], plan.terms, variables);
+    let relief = &plan.relief[i];
+    R::load(relief.friction) + share * R::load(relief.across_friction)
+}
+
 /// The segment from cross-section `i` to the next.
 #[inline(always)]
 fn segment<R: Real>(plan: &LinePlan<R::Storage>, i: usize, here: [R; 3], next: [R; 3]) -> Rising<R> {
@@ -416,7 +431,7 @@ pub(super) fn relieve<R: Real>(plan: &LinePlan<R::Storage>, variables: &[R], cou
     let n = plan.rows.len();
     let zero = R::lit(0.0);
     course.relief.clear();
-    course.relief.resize(n, [zero; 4]);
+    course.relief.resize(n, [zero; 5]);
     let first = crossing(plan, 0, variables);
     let mut here = first;
     let mut before = None;
@@ -431,14 +446,15 @@ pub(super) fn relieve<R: Real>(plan: &LinePlan<R::Storage>, variables: &[R], cou
         };
         let rising = segment(plan, i, here, next);
         course.length[i] = rising.length;
-        course.relief[i][1] = R::lit(GRAVITY_MPS2) * rising.direction[2];
+        let climb = R::lit(GRAVITY_MPS2) * rising.direction[2];
+        let mut place = [zero, climb, zero, zero, friction(plan, i, variables)];
         if let Some(before) = before {
             let ReliefRow { sin, cos, .. } = plan.relief[i];
             let [bend, dip, lean, press] = rising.turned(&before, [R::load(sin), R::load(cos)]);
             course.curvature[i] = bend;
-            let climb = course.relief[i][1];
-            course.relief[i] = [dip, climb, lean, press];
+            (place[0], place[2], place[3]) = (dip, lean, press);
         }
+        course.relief[i] = place;
         before = Some(rising);
         here = next;
     }
@@ -448,6 +464,7 @@ pub(super) fn relieve<R: Real>(plan: &LinePlan<R::Storage>, variables: &[R], cou
             course.curvature[end] = course.curvature[inner];
             course.relief[end] = course.relief[inner];
             course.relief[end][1] = climb;
+            course.relief[end][4] = friction(plan, end, variables);
         }
     }
 }

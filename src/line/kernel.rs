@@ -32,9 +32,9 @@ pub struct Course<R> {
     pub length: Vec<R>,
     /// Curvature at each section (1/m), without a sign; on a road in three dimensions along the surface, positive in left turns.
     pub curvature: Vec<R>,
-    /// Of a road in three dimensions at each section: curvature square to the surface (1/m), and gravity along the segment after it,
-    /// to the left and square to the surface (m/s^2). Empty on a level road.
-    pub relief: Vec<[R; 4]>,
+    /// Of a road that is not level and dry at each section: curvature square to the surface (1/m), gravity along the segment after it,
+    /// to the left and square to the surface (m/s^2), and friction as a share of the car's own. Empty on a level and dry road.
+    pub relief: Vec<[R; 5]>,
     /// Whether the DRS may be open on each segment; nowhere if empty.
     pub drs: Vec<bool>,
     /// Speed squared at each section (m^2/s^2).

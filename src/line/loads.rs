@@ -50,8 +50,12 @@ impl LoadTables<f64> {
 
 impl PointMass {
     /// The share of the tyres' grip that specific forces of the road (m/s^2) take at a speed (m/s): along the car, across it and square
-    /// to the surface. 1 is the ellipse under that load.
-    pub fn grip_used_under(&self, v_mps: f64, [along_mps2, across_mps2, load_mps2]: [f64; 3]) -> f64 {
+    /// to the surface; the last figure is the friction. 1 is the ellipse under that load and on that surface.
+    pub fn grip_used_under(
+        &self,
+        v_mps: f64,
+        [along_mps2, across_mps2, load_mps2, friction]: [f64; 4],
+    ) -> f64 {
         let share = (load_mps2 / GRAVITY_MPS2).clamp(0.0, MOST_LOAD);
         let swept = self.envelope.loads();
         let (drag, grip, lateral) = if swept.len() < 2 {
@@ -74,7 +78,8 @@ impl PointMass {
                 between(below.ay_mps2, above.ay_mps2),
             )
         };
-        let [along, across] = [(along_mps2 + drag).abs() / grip, across_mps2.abs() / lateral];
+        let along = (along_mps2 + drag).abs() / (friction * grip);
+        let across = across_mps2.abs() / (friction * lateral);
         let p = self.ellipse_exponent;
         (along.powf(p) + across.powf(p)).powf(1.0 / p)
     }

@@ -277,8 +277,12 @@ pub fn cross_sections_about(
     let points = cross_sections.points(&cross_sections.reference);
     cross_sections.drs = road.drs_along(&points);
     cross_sections.relief = road.relief_along(&points).map(|relief| SectionRelief {
-        z_m: relief.iter().map(|[z, _]| *z).collect(),
-        bank_rad: relief.iter().map(|[_, bank]| *bank).collect(),
+        z_m: relief.iter().map(|[z, ..]| *z).collect(),
+        bank_rad: relief.iter().map(|[_, bank, ..]| *bank).collect(),
+        friction: relief
+            .iter()
+            .map(|[.., friction, per_m]| [*friction, *per_m])
+            .collect(),
         foot_m: points,
     });
     Ok(cross_sections)

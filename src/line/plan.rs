@@ -26,7 +26,7 @@ pub struct SectionRow<S> {
     pub drs: bool,
 }
 
-/// Height and banking of one section, in differences of height.
+/// Height, banking and friction of one section, in differences of height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReliefRow<S> {
     /// From the right end of this cross-section up to that of the next (m).
@@ -37,6 +37,10 @@ pub struct ReliefRow<S> {
     pub sin: S,
     /// See above.
     pub cos: S,
+    /// Friction at the right end of the cross-section, as a share of the car's own,
+    pub friction: S,
+    /// and what it gains from there to the left end.
+    pub across_friction: S,
 }
 
 /// All sections, and the order in which a lap passes them.
@@ -53,7 +57,7 @@ pub struct LinePlan<S> {
     pub terms: usize,
     /// The sections.
     pub rows: Vec<SectionRow<S>>,
-    /// Height and banking of the sections; empty on a level road.
+    /// Height, banking and friction of the sections; empty on a level and dry road.
     pub relief: Vec<ReliefRow<S>>,
 }
 
@@ -84,7 +88,7 @@ impl LinePlan<f64> {
         }
     }
 
-    /// The plan of the road in three dimensions that `cross_sections` are, if they are.
+    /// The plan of the road that is not level and dry that `cross_sections` are, if they are.
     pub fn with_relief(mut self, cross_sections: &CrossSections) -> Self {
         let ends = [&cross_sections.right_m, &cross_sections.left_m];
         let [Some(right), Some(left)] = ends.map(|points| cross_sections.relief_of(points)) else {
@@ -92,12 +96,14 @@ impl LinePlan<f64> {
         };
         let n = right.len();
         let row = |i: usize| {
-            let [z, bank] = right[i];
+            let [z, bank, friction, _] = right[i];
             ReliefRow {
                 step_rise: right[(i + 1) % n][0] - z,
                 across_rise: left[i][0] - z,
                 sin: bank.sin(),
                 cos: bank.cos(),
+                friction,
+                across_friction: left[i][2] - friction,
             }
         };
         self.relief = (0..n).map(row).collect();
@@ -154,6 +160,8 @@ impl LinePlan<f64> {
                     across_rise: store(row.across_rise),
                     sin: store(row.sin),
                     cos: store(row.cos),
+                    friction: store(row.friction),
+                    across_friction: store(row.across_friction),
                 })
                 .collect(),
         }

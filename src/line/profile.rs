@@ -27,14 +27,14 @@ pub struct LapProfile {
     pub beyond_lock: usize,
     /// Whether the driver has the DRS open from each section to the next.
     pub drs_open: Vec<bool>,
-    /// Specific forces of the road on a road in three dimensions (m/s^2): along the car, to its left, and square to the surface. Empty
-    /// on a level road, where they are the accelerations and gravity.
-    pub forces_mps2: Vec<[f64; 3]>,
+    /// Specific forces of the road on a road that is not level and dry (m/s^2): along the car, to its left, and square to the surface;
+    /// and the friction. Empty on a level and dry road, where they are the accelerations, gravity and 1.
+    pub forces_mps2: Vec<[f64; 4]>,
 }
 
 impl LapProfile {
-    /// A lap of `time_s` on a line of this plan view (lengths of segments in m, and curvatures in 1/m), with height and banking if it has
-    /// them, from its speeds squared (m^2/s^2) at the sections; `drs_open` says of each segment whether the driver has the flap open.
+    /// A lap of `time_s` on a line of this plan view (lengths of segments in m, and curvatures in 1/m), with the surface under it if that is
+    /// not level and dry, from its speeds squared (m^2/s^2) at the sections; `drs_open` says of each segment whether the driver has the flap open.
     pub fn of_speeds(
         car: &PointMass,
         (segment_m, curvature_1pm): (&[f64], &[f64]),
@@ -128,7 +128,7 @@ pub fn lap_profile(
     lap_profile_on(car, within, (segment_m, curvature_1pm), None, entry_mps, drs)
 }
 
-/// As [`lap_profile`], on a line of this plan view (lengths of segments and curvatures) with height and banking.
+/// As [`lap_profile`], on a line of this plan view (lengths of segments and curvatures) with the surface under it.
 ///
 /// # Errors
 /// As [`lap_profile`]; also if the car has no tables for roads in three dimensions.

@@ -1,30 +1,29 @@
-//! Height and banking along one line, as laps on it need them.
+//! The surface of the road along one line, as laps on it need it.
 
 use super::fine::FineLine;
-use crate::track::interpolated;
+use crate::track::{Surface, interpolated};
 use crate::vehicle::powertrain::GRAVITY_MPS2;
 
-/// A line in three dimensions, at the points of a [`FineLine`].
+/// A line on a road that is not level and dry, at the points of a [`FineLine`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LineRelief {
-    /// Height (m).
-    pub z_m: Vec<f64>,
-    /// Banking (rad), positive with the left side up.
-    pub bank_rad: Vec<f64>,
+    /// Height (m), banking (rad, positive with the left side up), friction as a share of the car's own, and what that gains per metre
+    /// to the left (1/m).
+    pub surface: Vec<Surface>,
     /// Sine of the gradient of each segment, positive uphill; one fewer than points on an open line.
     pub gradient: Vec<f64>,
     /// Length of each segment along the slope (m).
     pub length_m: Vec<f64>,
     /// Curvature along the surface at each point (1/m), positive in left turns.
     pub bend_1pm: Vec<f64>,
-    /// At each point curvature square to the surface (1/m), and gravity along the segment after it, to the left and square to the
-    /// surface (m/s^2), as a [`Course`](super::kernel::Course) has them.
-    pub(super) course: Vec<[f64; 4]>,
+    /// At each point curvature square to the surface (1/m), gravity along the segment after it, to the left and square to the surface
+    /// (m/s^2), and friction, as a [`Course`](super::kernel::Course) has them.
+    pub(super) course: Vec<[f64; 5]>,
 }
 
 impl LineRelief {
-    /// From height (m) and banking (rad) at the points that `line` was laid through; smooth in between.
-    pub fn along(line: &FineLine, given: &[[f64; 2]]) -> Self {
+    /// From the surface at the points that `line` was laid through: height and banking smooth in between, friction linear.
+    pub fn along(line: &FineLine, given: &[Surface]) -> Self {
         let at = |k: usize| {
             let figures: Vec<f64> = given.iter().map(|figures| figures[k]).collect();
             let starts = line.section.iter().zip(&line.station_m);
@@ -37,13 +36,20 @@ impl LineRelief {
             }
             interpolated(&knots, &figures, line.closed, &line.station_m)
         };
-        Self::of(&line.segment_m, &line.curvature_1pm, at(0), at(1))
+        let smooth = at(0).into_iter().zip(at(1)).zip(&line.section);
+        let surface = smooth.map(|((z, bank), (section, share))| {
+            let (here, there) = (given[*section], given[(section + 1) % given.len()]);
+            let [friction, per_m] = [2, 3].map(|k| here[k] + share * (there[k] - here[k]));
+            [z, bank, friction, per_m]
+        });
+        Self::of(&line.segment_m, &line.curvature_1pm, surface.collect())
     }
 
-    /// From the lengths of segments (m) and curvatures (1/m) of the plan view, heights (m) and banking (rad). The line is closed if it
+    /// From the lengths of segments (m) and curvatures (1/m) of the plan view and the surface at the points. The line is closed if it
     /// has as many segments as points.
-    pub fn of(segment_m: &[f64], curvature_1pm: &[f64], z_m: Vec<f64>, bank_rad: Vec<f64>) -> Self {
-        let n = z_m.len();
+    pub fn of(segment_m: &[f64], curvature_1pm: &[f64], surface: Vec<Surface>) -> Self {
+        let n = surface.len();
+        let z_m: Vec<f64> = surface.iter().map(|surface| surface[0]).collect();
         let closed = segment_m.len() == n;
         let rises = segment_m
             .iter()
@@ -70,7 +76,8 @@ impl LineRelief {
             let spacing = 0.5 * (length_m[before] + length_m[after]);
             let turn = level_squared * curvature_1pm[i];
             let bow = (gradient[after] - gradient[before]) / spacing / level_squared.sqrt();
-            let (sin, cos) = bank_rad[i].sin_cos();
+            let [_, bank_rad, friction, _] = surface[i];
+            let (sin, cos) = bank_rad.sin_cos();
             let gravity = GRAVITY_MPS2 * level_squared.sqrt();
             bend_1pm.push(turn * cos + bow * sin);
             course.push([
@@ -78,11 +85,11 @@ impl LineRelief {
                 GRAVITY_MPS2 * gradient[i.min(gradient.len() - 1)],
                 gravity * sin,
                 gravity * cos,
+                friction,
             ]);
         }
         Self {
-            z_m,
-            bank_rad,
+            surface,
             gradient,
             length_m,
             bend_1pm,
@@ -90,20 +97,20 @@ impl LineRelief {
         }
     }
 
-    /// Curvature square to the surface at a point (1/m), and gravity along the segment after it, to the left and square to the surface
-    /// (m/s^2).
-    pub(crate) fn place(&self, point: usize) -> [f64; 4] {
+    /// Curvature square to the surface at a point (1/m), gravity along the segment after it, to the left and square to the surface
+    /// (m/s^2), and friction.
+    pub(crate) fn place(&self, point: usize) -> [f64; 5] {
         self.course[point]
     }
 
     /// The specific forces of the road at each point (m/s^2), at these speeds (m/s) and accelerations (m/s^2): along the car,
-    /// to its left, and square to the surface.
-    pub fn forces_mps2(&self, v_mps: &[f64], ax_mps2: &[f64]) -> Vec<[f64; 3]> {
+    /// to its left, and square to the surface. The last figure is the friction.
+    pub fn forces_mps2(&self, v_mps: &[f64], ax_mps2: &[f64]) -> Vec<[f64; 4]> {
         let places = self.course.iter().zip(&self.bend_1pm);
         let motions = v_mps.iter().zip(ax_mps2);
-        let at = |((course, bend), (v, ax)): ((&[f64; 4], &f64), (&f64, &f64))| {
-            let [dip, climb, lean, press] = course;
-            [ax + climb, v * v * bend + lean, v * v * dip + press]
+        let at = |((course, bend), (v, ax)): ((&[f64; 5], &f64), (&f64, &f64))| {
+            let [dip, climb, lean, press, friction] = course;
+            [ax + climb, v * v * bend + lean, v * v * dip + press, *friction]
         };
         places.zip(motions).map(at).collect()
     }

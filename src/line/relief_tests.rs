@@ -1,4 +1,4 @@
-//! Laps on roads in three dimensions, against cases worked by hand.
+//! Laps on roads that are not level and dry, against cases worked by hand.
 
 use super::ground::{Ground, Grounds, Sloped, SlopedRoad};
 use super::kernel::{self, Course, Wanted, lap_time, shape};
@@ -60,6 +60,7 @@ fn ring(
             foot_m,
             z_m: (0..sections).map(|i| relief(angle(i))[0]).collect(),
             bank_rad: (0..sections).map(|i| relief(angle(i))[1]).collect(),
+            friction: vec![[1.0, 0.0]; sections],
         }),
     }
 }
@@ -118,10 +119,12 @@ fn a_crest_unloads_by_the_speed_squared_over_its_radius() {
     let segment_m: Vec<f64> = level.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let n = angles.len();
     for (way, kind) in [(1.0, "crest"), (-1.0, "dip")] {
-        let z_m = angles.iter().map(|a| way * radius * (a.cos() - 1.0)).collect();
-        let line = LineRelief::of(&segment_m, &vec![0.0; n], z_m, vec![0.0; n]);
+        let surface = angles
+            .iter()
+            .map(|a| [way * radius * (a.cos() - 1.0), 0.0, 1.0, 0.0]);
+        let line = LineRelief::of(&segment_m, &vec![0.0; n], surface.collect());
         let forces = line.forces_mps2(&vec![40.0; n], &vec![0.0; n]);
-        let [_, across, load] = forces[n / 2];
+        let [_, across, load, _] = forces[n / 2];
         let wanted = GRAVITY_MPS2 - way * 1600.0 / radius;
         // Chords of an arc of 2.5 mrad turn by its angle; their lengths are short by a part in a million.
         assert!((load - wanted).abs() < 1e-5, "{kind}: {load} for {wanted}");
@@ -136,7 +139,8 @@ fn a_hill_climb_balances_its_energy() {
     let level: Vec<f64> = (0..n).map(|i| 2.0 * i as f64).collect();
     let z_m: Vec<f64> = level.iter().map(|s| 12.0 * (s / 60.0).sin() + 0.03 * s).collect();
     let climbed = z_m[n - 1] - z_m[0];
-    let line = LineRelief::of(&vec![2.0; n - 1], &vec![0.0; n], z_m, vec![0.0; n]);
+    let surface = z_m.iter().map(|z| [*z, 0.0, 1.0, 0.0]).collect();
+    let line = LineRelief::of(&vec![2.0; n - 1], &vec![0.0; n], surface);
     let (drive, start) = (3.0, 25.0);
     let car = car([200.0, 200.0, drive, 0.0], 200.0);
     let lap = lap_profile_on(
@@ -193,7 +197,7 @@ fn gravity_keeps_its_size_in_the_frame_of_the_road() {
     let (road, alpha) = hills();
     let course = course_of(&road, &alpha);
     for i in 1..719 {
-        let [_, climb, lean, press] = course.relief[i];
+        let [_, climb, lean, press, _] = course.relief[i];
         let before = course.relief[i - 1][1];
         let size = (0.25 * (climb + before).powi(2) + lean * lean + press * press).sqrt();
         assert!((size / GRAVITY_MPS2 - 1.0).abs() < 1e-12, "{size} at {i}");
@@ -250,8 +254,8 @@ fn the_fine_line_has_the_lap_of_the_cross_sections() {
     let own = fine.relief.as_ref().unwrap();
     let off = along
         .iter()
-        .zip(&own.z_m)
-        .map(|(a, z)| (a[0] - z).abs())
+        .zip(&own.surface)
+        .map(|(a, own)| (a[0] - own[0]).abs())
         .fold(0.0, f64::max);
     assert!(off < 0.02, "{off}");
 }
@@ -283,6 +287,7 @@ fn tyres_give_nothing_back_beyond_the_loads_that_were_swept() {
             climb: 0.0,
             lean: 0.0,
             press: share * GRAVITY_MPS2,
+            friction: 1.0,
         };
         let [_, lost] = Ground::<f64>::left_for_driving(there, &table, 900.0, 1.0);
         assert!((lost - wanted).abs() < 1e-9, "{share}: {lost}");
@@ -316,6 +321,7 @@ fn limits_under_a_load_are_those_that_were_swept() {
             climb: 0.0,
             lean: 0.0,
             press: share * GRAVITY_MPS2,
+            friction: 1.0,
         };
         let ([lateral, grip, drive, drag], root) = Ground::<f64>::limits(there, &table, 900.0);
         assert!(
@@ -323,8 +329,95 @@ fn limits_under_a_load_are_those_that_were_swept() {
             "{share}: {lateral}"
         );
         assert!((drive - 5.0).abs() < 1e-9 && (drag - 1.0).abs() < 1e-9 && root == 1.0);
-        let used = car.grip_used_under(30.0, [0.0, wanted, share * GRAVITY_MPS2]);
+        let used = car.grip_used_under(30.0, [0.0, wanted, share * GRAVITY_MPS2, 1.0]);
         let across = used.powi(2) - (1.0 / (0.9 * wanted)).powi(2);
         assert!((across - 1.0).abs() < 1e-9, "{share}: {used}");
+    }
+}
+
+/// A flat ring of 100 m whose friction is so much on the middle and gains so much per metre to the left, which is its inside.
+fn slippery_ring(friction: [f64; 2]) -> CrossSections {
+    let mut road = ring(360, |_| 100.0, 10.0, |_| [0.0, 0.0]);
+    road.relief.as_mut().unwrap().friction = vec![friction; 360];
+    road
+}
+
+/// On a circle the corner speed squared is `f m g R`; across the road `f` is that of the place.
+#[test]
+fn the_corner_speed_goes_with_the_friction_of_the_place() {
+    let road = slippery_ring([0.7, -0.04]);
+    let table = car([12.0, 10.0, 5.0, 0.0], 80.0).table().unwrap();
+    for (alpha, radius, friction) in [(0.5, 100.0, 0.7), (0.0, 105.0, 0.9), (1.0, 95.0, 0.5)] {
+        let there = ground(&course_of(&road, &[alpha; 360]), 17);
+        assert!((there.friction - friction).abs() < 1e-12, "{}", there.friction);
+        let wanted = friction * 12.0 * radius;
+        let found = kernel::corner::<f64>(&table, there);
+        assert!((found / wanted - 1.0).abs() < 1e-9, "{found} for {wanted}");
+    }
+}
+
+/// Straight on, brakes and driven tyres have the friction's share of the grip, and the engine has what it had. In a bend at its limit
+/// nothing is left, and what the tyres take from the drive goes with the square.
+#[test]
+fn brakes_and_traction_go_with_the_friction_and_the_engine_does_not() {
+    let at = |friction: f64| Sloped {
+        bend: 0.0,
+        dip: 0.0,
+        climb: 0.0,
+        lean: 0.0,
+        press: GRAVITY_MPS2,
+        friction,
+    };
+    let (grip, engine, drag) = (10.0, 4.0, 0.5);
+    let table = car([12.0, grip, engine, drag], 80.0).table().unwrap();
+    for friction in [0.1, 0.3, 0.6, 1.0, 1.2] {
+        let braking = kernel::deceleration::<f64>(&table, 900.0, at(friction));
+        assert!(
+            (braking - friction * grip - drag).abs() < 1e-9,
+            "{friction}: {braking}"
+        );
+        let driving = kernel::acceleration::<f64>(&table, false, 900.0, at(friction));
+        let wanted = engine.min(friction * grip) - drag;
+        assert!((driving - wanted).abs() < 1e-9, "{friction}: {driving}");
+        let bend = Sloped {
+            bend: friction * 12.0 / 900.0,
+            ..at(friction)
+        };
+        let braking = kernel::deceleration::<f64>(&table, 900.0, bend);
+        assert!((braking - drag).abs() < 1e-6, "{friction}: {braking}");
+    }
+    let limits = car([12.0, 10.0, 5.0, 0.0], 80.0).envelope;
+    let rows = limits.rows().len();
+    let in_bends = BendTraction {
+        shares: vec![0.0, 1.0],
+        rows: vec![vec![10.0, 0.0]; rows],
+        lost: vec![vec![0.8; 2]; rows],
+    };
+    let taking = PointMass {
+        relief: true,
+        ..PointMass::new(limits.with_bend_traction(in_bends).unwrap(), 2.6)
+    };
+    let table = taking.table().unwrap();
+    let [_, lost] = Ground::<f64>::left_for_driving(at(0.5), &table, 900.0, 0.6);
+    assert!((lost - 0.2).abs() < 1e-9, "{lost}");
+}
+
+/// A lap says that it uses all of the grip where it is at the limit, however slippery the road.
+#[test]
+fn the_grip_used_is_that_of_the_slippery_road() {
+    let road = slippery_ring([0.6, 0.0]);
+    let car = car([12.0, 10.0, 8.0, 0.0], 80.0);
+    let points = road.points(&[0.5; 360]);
+    let relief = road.relief_of(&points).unwrap();
+    let fine = FineLine::on(&points, Some(&relief), true, 1.0, Some((&car, &[])), 0.0).unwrap();
+    let lap = fine.lap.as_ref().unwrap();
+    let wanted_s = TAU * 100.0 / (0.6f64 * 12.0 * 100.0).sqrt();
+    assert!(
+        (lap.time_s / wanted_s - 1.0).abs() < 1e-5,
+        "{} for {wanted_s}",
+        lap.time_s
+    );
+    for used in lap.grip_used(&car) {
+        assert!((used - 1.0).abs() < 1e-3, "{used}");
     }
 }

@@ -365,7 +365,7 @@ fn tyres_take_from_the_engine_in_bends() {
     for (share, wanted) in [(0.0, 3.8), (0.6, 3.4), (0.8, 3.0)] {
         let kernel = kernel::acceleration::<f64>(&table, false, 900.0, share * 12.0 / 900.0);
         let root = (1.0f64 - share * share).sqrt();
-        let solver = solvers.traction(30.0, root).unwrap().value;
+        let solver = solvers.traction(30.0, root, 1.0).unwrap().value;
         // Cells of a thirty-second of the root cut the corner at 0.6.
         assert!((kernel - wanted).abs() < 0.02, "{share}: {kernel}");
         assert!((solver - wanted).abs() < 1e-9, "{share}: {solver}");

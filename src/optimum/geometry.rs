@@ -20,7 +20,7 @@ pub struct LineMap {
     reach: Vec<(usize, DVec2)>,
     /// Whether the DRS may be open from each point to the next; nowhere if empty.
     pub(super) drs: Vec<bool>,
-    /// Height and banking of the cross-section that each point lies on, and its direction to the left; none on a level road.
+    /// The surface of the cross-section that each point lies on, and its direction to the left; none on a level and dry road.
     relief: Option<(SectionRelief, Vec<DVec2>)>,
 }
 
@@ -129,8 +129,7 @@ impl LineMap {
         (map, bounds)
     }
 
-    /// The map of a line with a point at every cross-section, which has the DRS open where these allow it and their height and
-    /// banking.
+    /// The map of a line with a point at every cross-section, which has the DRS open where these allow it and their surface.
     fn on(mut self, cross_sections: &CrossSections) -> Self {
         self.drs.clone_from(&cross_sections.drs);
         let ends = cross_sections.right_m.iter().zip(&cross_sections.left_m);
@@ -172,10 +171,9 @@ impl LineMap {
         let mut shape = Shape::of(&points, self.closed);
         if let Some((relief, left)) = self.relief.as_ref().filter(|_| !shape.stands_still()) {
             let places = points.iter().zip(left).enumerate();
-            let z_m = places.map(|(i, (point, left))| relief.height_m(i, *left, *point));
+            let surface = places.map(|(i, (point, left))| relief.at(i, *left, *point));
             let (segments, curvature) = (&shape.length_m, &shape.curvature_1pm);
-            let (z_m, bank_rad) = (z_m.collect(), relief.bank_rad.clone());
-            shape.relief = Some(LineRelief::of(segments, curvature, z_m, bank_rad));
+            shape.relief = Some(LineRelief::of(segments, curvature, surface.collect()));
         }
         shape
     }
@@ -238,7 +236,7 @@ pub(super) struct Shape {
     pub spacing_m: Vec<f64>,
     /// Turn over spacing (1/m).
     pub curvature_1pm: Vec<f64>,
-    /// Height and banking along it; none on a level road.
+    /// The surface along it; none on a level and dry road.
     pub relief: Option<LineRelief>,
 }
 
@@ -325,6 +323,18 @@ impl Shape {
                     terms,
                 );
             }
+        }
+    }
+
+    /// Adds `scale` times the relative change of the friction at point `i`.
+    pub fn add_friction(&self, map: &LineMap, i: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        let (Some(relief), Some((_, left))) = (&self.relief, &map.relief) else {
+            return;
+        };
+        let [.., friction, per_m] = relief.surface[i];
+        if per_m != 0.0 {
+            let bar = left[i] * (scale * per_m / friction);
+            terms.extend(map.reach(i).iter().map(|&(k, reach)| (k, reach.dot(bar))));
         }
     }
 

@@ -50,9 +50,9 @@ pub struct BendGrip {
 pub trait GripEnvelope: Sync {
     /// The envelope at a speed (m/s).
     fn at(&self, speed_mps: f64) -> Grip;
-    /// What driven tyres and engine can give at a speed (m/s) and a root of what the lateral share leaves; `None` where the ellipse says
-    /// so.
-    fn traction(&self, _speed_mps: f64, _root: f64) -> Option<BendGrip> {
+    /// What driven tyres and engine can give at a speed (m/s), a root of what the lateral share leaves and a friction (as a share of the
+    /// car's own); `None` where the ellipse says so.
+    fn traction(&self, _speed_mps: f64, _root: f64, _friction: f64) -> Option<BendGrip> {
         None
     }
     /// The envelopes on both sides of a load over mass, each with its own load (m/s^2), of a car whose limits are known under loads.
@@ -345,7 +345,7 @@ fn push(envelope: &dyn GripEnvelope, pass: Pass, e: f64, curvature_1pm: f64) -> 
     let (drag_value, drag_slope) = (sign * drag.value, sign * drag.by_speed * per_square);
     let share = left.max(0.0).sqrt();
     let in_bend = match pass {
-        Pass::Drive => envelope.traction(v, share),
+        Pass::Drive => envelope.traction(v, share, 1.0),
         Pass::Brake => None,
     };
     let tyre = in_bend.map_or(grip.longitudinal.value * share, |t| t.value);

@@ -111,7 +111,7 @@ impl GripEnvelope for PointMassEnvelope {
         }
     }
 
-    fn traction(&self, v_mps: f64, root: f64) -> Option<BendGrip> {
+    fn traction(&self, v_mps: f64, root: f64, friction: f64) -> Option<BendGrip> {
         let BendTraction { shares, rows, lost } = self.in_bends.as_ref()?;
         let [low, high] = self.around(v_mps);
         let (start, span) = (self.rows[low].v_mps, self.rows[high].v_mps - self.rows[low].v_mps);
@@ -120,15 +120,19 @@ impl GripEnvelope for PointMassEnvelope {
         } else {
             0.0
         };
-        let within = |rows: &[Vec<f64>]| {
-            let [from, to] = [low, high].map(|i| traction_at_root(shares, &rows[i], root));
+        let within = |rows: &[Vec<f64>], factor: f64| {
+            let [from, to] = [low, high].map(|i| {
+                let (value, by_root) = traction_at_root(shares, &rows[i], root);
+                (factor * value, factor * by_root)
+            });
             BendGrip {
                 value: from.0 + share * (to.0 - from.0),
                 by_speed: if span > 0.0 { (to.0 - from.0) / span } else { 0.0 },
                 by_root: from.1 + share * (to.1 - from.1),
             }
         };
-        let (tyres, lost) = (within(rows), within(lost));
+        // What tyres take from the drive goes with their force and their slip angle, both of them with the friction.
+        let (tyres, lost) = (within(rows, friction), within(lost, friction * friction));
         let grip = self.at(v_mps);
         let engine = BendGrip {
             value: grip.drive.value - lost.value,
@@ -137,7 +141,7 @@ impl GripEnvelope for PointMassEnvelope {
         };
         let least = if engine.value < tyres.value { engine } else { tyres };
         // Tyres that drive never have more than the ellipse.
-        (least.value < grip.longitudinal.value * root).then_some(least)
+        (least.value < friction * grip.longitudinal.value * root).then_some(least)
     }
 
     fn loaded(&self, load_mps2: f64) -> Option<[(f64, &dyn GripEnvelope); 2]> {
@@ -190,11 +194,11 @@ mod tests {
             for root in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99f64] {
                 let used = (1.0 - root * root).sqrt() * grip.lateral.value / (v * v);
                 let kernel = acceleration::<f64>(&table, false, v * v, used) + grip.drag.value;
-                let bend = solvers.traction(v, root);
+                let bend = solvers.traction(v, root, 1.0);
                 let value = bend.map_or(grip.longitudinal.value * root, |bend| bend.value);
                 assert!((kernel - value).abs() < 0.15, "{v}, {root}: {kernel} {value}");
                 // Away from the shares that were swept the slopes are those of differences.
-                let step = |v: f64, root: f64| solvers.traction(v, root).map(|bend| bend.value);
+                let step = |v: f64, root: f64| solvers.traction(v, root, 1.0).map(|bend| bend.value);
                 if let (Some(bend), Some(faster), Some(wider)) =
                     (bend, step(v + 1e-6, root), step(v, root + 1e-7))
                 {

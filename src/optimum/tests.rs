@@ -46,7 +46,7 @@ impl GripEnvelope for DrivenByTwo {
         Racer.at(v)
     }
 
-    fn traction(&self, v: f64, root: f64) -> Option<BendGrip> {
+    fn traction(&self, v: f64, root: f64, _: f64) -> Option<BendGrip> {
         Some(BendGrip {
             value: (8.5 + 0.03 * v) * root * root,
             by_speed: 0.03 * root * root,

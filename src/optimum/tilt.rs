@@ -1,7 +1,7 @@
 //! What a car can do at one place of a road in three dimensions, as the solvers use it.
 //!
-//! A step's model takes the load's curvature, banking and gradient of each place as they are on the line that it starts from; laps by
-//! which steps are judged have those of their own line.
+//! A step's model takes the load's curvature, banking and gradient of each place as they are on the line that it starts from, and the
+//! friction with what it gains across the road; laps by which steps are judged have those of their own line.
 
 use super::geometry::Shape;
 use super::lap::{BendGrip, Grip, GripEnvelope, Slope};
@@ -17,6 +17,8 @@ struct Tilt {
     climb: f64,
     lean: f64,
     press: f64,
+    /// As a share of the car's own.
+    friction: f64,
 }
 
 /// The envelope of a car at a place.
@@ -56,57 +58,58 @@ impl<'a> Tilted<'a> {
 
 impl GripEnvelope for Tilted<'_> {
     fn at(&self, v: f64) -> Grip {
-        let mut grip = match self.between(v) {
-            None => self.level.at(v),
-            Some(([below, above], share, by_speed)) => {
-                let (low, high) = (below.at(v), above.at(v));
-                let between = |figure: fn(&Grip) -> Slope| {
-                    let (a, b) = (figure(&low), figure(&high));
-                    Slope {
-                        value: a.value + share * (b.value - a.value),
-                        by_speed: a.by_speed
-                            + share * (b.by_speed - a.by_speed)
-                            + by_speed * (b.value - a.value),
-                    }
-                };
-                let held = |slope: Slope| {
-                    // A car without load has next to no grip.
-                    if slope.value < LEAST_GRIP {
-                        Slope {
-                            value: LEAST_GRIP,
-                            by_speed: 0.0,
-                        }
-                    } else {
-                        slope
-                    }
-                };
-                Grip {
-                    lateral: held(between(|grip| grip.lateral)),
-                    longitudinal: held(between(|grip| grip.longitudinal)),
-                    drive: between(|grip| grip.drive),
-                    drag: between(|grip| grip.drag),
-                }
+        let level = ([self.level; 2], 0.0, 0.0);
+        let ([below, above], share, by_speed) = self.between(v).unwrap_or(level);
+        let (low, high, friction) = (below.at(v), above.at(v), self.tilt.friction);
+        let between = |figure: fn(&Grip) -> Slope| {
+            let (a, b) = (figure(&low), figure(&high));
+            Slope {
+                value: a.value + share * (b.value - a.value),
+                by_speed: a.by_speed + share * (b.by_speed - a.by_speed) + by_speed * (b.value - a.value),
             }
+        };
+        let of_tyres = |slope: Slope| {
+            // A car without load has next to no grip.
+            if friction * slope.value < LEAST_GRIP {
+                return Slope {
+                    value: LEAST_GRIP,
+                    by_speed: 0.0,
+                };
+            }
+            Slope {
+                value: friction * slope.value,
+                by_speed: friction * slope.by_speed,
+            }
+        };
+        let mut grip = Grip {
+            lateral: of_tyres(between(|grip| grip.lateral)),
+            longitudinal: of_tyres(between(|grip| grip.longitudinal)),
+            drive: between(|grip| grip.drive),
+            drag: between(|grip| grip.drag),
         };
         grip.drag.value += self.tilt.climb;
         grip
     }
 
-    fn traction(&self, v: f64, root: f64) -> Option<BendGrip> {
+    fn traction(&self, v: f64, root: f64, friction: f64) -> Option<BendGrip> {
+        let friction = friction * self.tilt.friction;
         let Some(([below, above], share, by_speed)) = self.between(v) else {
-            return self.level.traction(v, root);
+            return self.level.traction(v, root, friction);
         };
         let of = |envelope: &dyn GripEnvelope| {
-            envelope.traction(v, root).unwrap_or_else(|| {
+            envelope.traction(v, root, friction).unwrap_or_else(|| {
                 let grip = envelope.at(v).longitudinal;
                 BendGrip {
-                    value: grip.value * root,
-                    by_speed: grip.by_speed * root,
-                    by_root: grip.value,
+                    value: friction * grip.value * root,
+                    by_speed: friction * grip.by_speed * root,
+                    by_root: friction * grip.value,
                 }
             })
         };
-        if below.traction(v, root).is_none() && above.traction(v, root).is_none() {
+        if [below, above]
+            .iter()
+            .all(|envelope| envelope.traction(v, root, friction).is_none())
+        {
             return None;
         }
         let (low, high) = (of(below), of(above));
@@ -153,12 +156,13 @@ impl Shape {
         let Some(relief) = &self.relief else {
             return of(envelope);
         };
-        let [dip, climb, lean, press] = relief.place(i);
+        let [dip, climb, lean, press, friction] = relief.place(i);
         let tilt = Tilt {
             dip,
             climb,
             lean,
             press,
+            friction,
         };
         of(&Tilted::of(envelope, tilt))
     }
@@ -182,6 +186,7 @@ impl Shape {
             climb: here[1],
             lean: both(2),
             press: both(3),
+            friction: both(4),
         };
         of(&Tilted::of(envelope, tilt))
     }
@@ -223,6 +228,7 @@ mod tests {
             bank_rad: (0..150)
                 .map(|i| -share * 0.07 * (1.0 + (2.0 * angle(i)).cos()))
                 .collect(),
+            friction: vec![[1.0, 0.0]; 150],
         };
         CrossSections {
             relief: Some(relief),
@@ -276,6 +282,66 @@ mod tests {
         assert!((hills[0] / level[0] - 1.0).abs() > 5e-3, "{hills:?} {level:?}");
         let off = (hills[0] / hills[1]) / (level[0] / level[1]) - 1.0;
         assert!(off.abs() < 2e-3, "{hills:?} {level:?}");
+        // The same where it is slippery along the road and across it.
+        let mut wet = road(1.0);
+        let angle = |i: usize| TAU * i as f64 / 150.0;
+        wet.relief.as_mut().unwrap().friction = (0..150)
+            .map(|i| [0.7 + 0.2 * (3.0 * angle(i)).sin(), 0.02 * (2.0 * angle(i)).cos()])
+            .collect();
+        let wet = times(&wet);
+        assert!(wet[0] / hills[0] > 1.1, "{wet:?} {hills:?}");
+        let off = (wet[0] / wet[1]) / (hills[0] / hills[1]) - 1.0;
+        assert!(off.abs() < 2e-3, "{wet:?} {hills:?}");
+    }
+
+    /// On a ring, driven clockwise, whose outside has more friction the fastest lap is along the outer edge, which without it would be
+    /// the slowest. The lap on a circle takes `2 pi sqrt(r / (f a))`.
+    #[test]
+    fn the_fastest_line_goes_where_the_friction_pays() {
+        let rows = (1..=70).map(|i| EnvelopeRow {
+            v_mps: f64::from(i),
+            ay_mps2: 12.0,
+            ax_grip_mps2: 11.0,
+            ax_drive_mps2: 6.0,
+            drag_mps2: 0.0,
+        });
+        let car = PointMass {
+            relief: true,
+            ..PointMass::new(Envelope::new("made up", rows.collect()).unwrap(), 2.6)
+        };
+        let envelope = PointMassEnvelope::new(&car).unwrap();
+        let ring = Shape::parse("circle:95:105").unwrap().unwrap();
+        let level = ring.cross_sections(120).unwrap();
+        let fastest_on = |friction: [f64; 2]| {
+            let road = CrossSections {
+                relief: Some(SectionRelief {
+                    foot_m: level.points(&[0.5; 120]),
+                    z_m: vec![0.0; 120],
+                    bank_rad: vec![0.0; 120],
+                    friction: vec![friction; 120],
+                }),
+                ..level.clone()
+            };
+            let map = LineMap::at_every_cross_section(&road);
+            let problem = ReferenceProblem {
+                envelope: Some(&envelope),
+                ..ReferenceProblem::of(&map)
+            };
+            let bounds = Bounds::road(120);
+            fastest(&problem, &bounds, &[0.5; 120], &DescentSettings::default()).unwrap()
+        };
+        for (friction, radius, there) in [([0.7, 0.04], 105.0, 0.9), ([0.7, 0.0], 95.0, 0.7)] {
+            let found = fastest_on(friction);
+            let wanted_s = TAU * (radius / (there * 12.0f64)).sqrt();
+            // A ring of 120 chords is a part in ten thousand shorter than its circle.
+            let off = found.value / wanted_s - 1.0;
+            assert!(
+                off.abs() < 3e-4,
+                "{} for {wanted_s}: {:?}",
+                found.value,
+                found.status
+            );
+        }
     }
 
     /// Tyres that lose less of the engine the more they carry leave no more than all of it, however much that is.
@@ -303,10 +369,11 @@ mod tests {
                 climb: 0.0,
                 lean: 0.0,
                 press: share * GRAVITY_MPS2,
+                friction: 1.0,
             };
             let there = Tilted::of(&envelope, tilt);
             let drive = there.at(40.0).drive.value;
-            let left = there.traction(40.0, 1.0).map(|bend| bend.value);
+            let left = there.traction(40.0, 1.0, 1.0).map(|bend| bend.value);
             assert_eq!(left.is_some(), share < 1.6, "{share}: {left:?} of {drive}");
             assert!(
                 left.is_none_or(|left| left < drive),

@@ -92,6 +92,7 @@ pub(super) fn add_time(
         for sign in [1.0, -1.0].into_iter().filter(|sign| sign * used >= NEAR_CORNER) {
             let mut terms = vec![(square(i), -sign * by_square)];
             shape.add_curvature(map, i, -sign * squares[i] / grip.value, &mut terms);
+            shape.add_friction(map, i, 1.0, &mut terms);
             let constant = (1.0 - sign * used).max(0.0);
             program.add_nonnegative(Affine { constant, terms }.merged());
         }
@@ -158,21 +159,32 @@ fn add_segment(
             shape.add_curvature(map, end, share * middle / across, &mut change);
         }
         let across = affine(used, change);
+        // The ellipse grows with the friction.
+        let slippery = |scale: f64| {
+            let mut terms = Vec::new();
+            for (end, share) in ends {
+                shape.add_friction(map, end, scale * share, &mut terms);
+            }
+            terms
+        };
         let far = longitudinal.constant.hypot(used) < FAR;
         if far {
-            program.add_nonnegative(affine(1.0 + longitudinal.constant, longitudinal.terms.clone()));
+            let both = [slippery(1.0), longitudinal.terms.clone()].concat();
+            program.add_nonnegative(affine(1.0 + longitudinal.constant, both));
         } else {
             // A segment may lie slightly beyond the ellipse, by rounding or because the car coasts through its middle. It may
             // stay there.
-            let whole = affine(longitudinal.constant.hypot(used).max(1.0), Vec::new());
+            let whole = affine(longitudinal.constant.hypot(used).max(1.0), slippery(1.0));
             program.add_cone([whole, longitudinal.clone(), across.clone()]);
         }
         // Driven tyres have less. What they have is linear in the root of what the lateral share leaves, which is a variable below
         // a circle; far from it, the circle's tangent will do.
         let root = root_left(used);
         let closer = root_left((used.abs() + NEAR).min(1.0));
-        let least = envelope.traction(v, closer).map_or(along * closer, |t| t.value);
-        let traction = envelope.traction(v, root);
+        let least = envelope
+            .traction(v, closer, 1.0)
+            .map_or(along * closer, |t| t.value);
+        let traction = envelope.traction(v, root, 1.0);
         if let Some(traction) = traction.filter(|_| least < demand + NEAR * along) {
             let slope = 0.5 * per_square * (traction.by_speed - grip.drag.by_speed) / along;
             let by_root = traction.by_root / along;
@@ -181,13 +193,15 @@ fn add_segment(
             if far {
                 let tangent = -by_root * used / root;
                 change.extend(across.terms.iter().map(|&(k, a)| (k, tangent * a)));
+                change.extend(slippery(traction.value / along - tangent * used));
                 program.add_nonnegative(affine(spare, change));
             } else {
                 // The cone holds it below 1, and nothing gains by less than zero.
                 let left = program.add_variables(std::iter::once((f64::NEG_INFINITY, f64::INFINITY)));
-                let whole = affine(used.abs().max(1.0), Vec::new());
+                let whole = affine(used.abs().max(1.0), slippery(1.0));
                 program.add_cone([whole, affine(0.0, vec![(left, 1.0)]), across]);
                 change.push((left, by_root));
+                change.extend(slippery(traction.value / along - by_root * root));
                 program.add_nonnegative(affine(spare - by_root * root, change));
             }
         }

@@ -74,7 +74,7 @@ fn circuits_of(names: &[&str]) -> Result<Vec<Circuit>> {
     names.iter().map(circuit).collect()
 }
 
-/// A circuit with made-up hills, 6 m high, and banking of up to four degrees.
+/// A circuit with made-up hills, 6 m high, banking of up to four degrees, and friction from 0.75 to 1.
 pub fn in_hills(mut circuit: Circuit) -> Circuit {
     let angle = |station: &f64| TAU * station / circuit.length_m;
     let stations = &circuit.station_m;
@@ -84,6 +84,15 @@ pub fn in_hills(mut circuit: Circuit) -> Circuit {
             .map(|s| 3.0 * angle(s).sin() + 0.5 * (4.0 * angle(s)).cos())
             .collect(),
         bank_rad: stations.iter().map(|s| 0.07 * (2.0 * angle(s)).sin()).collect(),
+        friction: stations
+            .iter()
+            .map(|s| {
+                [
+                    0.9 + 0.08 * (3.0 * angle(s)).cos(),
+                    0.006 * (5.0 * angle(s)).sin(),
+                ]
+            })
+            .collect(),
         change: ReliefChange::default(),
     };
     circuit.relief = Some(relief);

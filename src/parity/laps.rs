@@ -37,6 +37,7 @@ pub fn work_of(replay: &ReplayProblem) -> (usize, u64) {
         wheel_speed: sample.wheel_speed.map(|x| Counted(x as f32)),
         steer: Counted(sample.steer as f32),
         flap: Counted(sample.flap as f32),
+        friction: None,
     };
     let state = CarState::from_array(window.initial.map(|x| Counted(x as f32)));
     // All steps are alike.

@@ -118,7 +118,7 @@ pub(super) fn with_drs(envelope: &Envelope, sections: usize) -> Result<(Envelope
     Ok((envelope.clone().with_open(open)?, drs))
 }
 
-/// Cross-sections with made-up hills and banking, and the car with made-up limits under loads.
+/// Cross-sections with made-up hills, banking and friction, and the car with made-up limits under loads.
 ///
 /// # Errors
 /// None in practice: the made-up limits are within those of the car.
@@ -131,6 +131,9 @@ pub fn in_relief(road: &CrossSections, car: &PointMass) -> Result<(CrossSections
             .map(|i| 15.0 * angle(i).sin() + 4.0 * (7.0 * angle(i)).cos())
             .collect(),
         bank_rad: (0..n).map(|i| 0.1 * (5.0 * angle(i)).sin()).collect(),
+        friction: (0..n)
+            .map(|i| [0.8 + 0.15 * (3.0 * angle(i)).cos(), 0.02 * (4.0 * angle(i)).sin()])
+            .collect(),
     };
     let under = |share: f64| {
         let grip = share.powf(0.9);

@@ -117,7 +117,7 @@ pub fn allowed(problem: &SteadyProblem, candidate: &[f64], state: &Settling<f64>
     let case = step::Case {
         table: table(problem, candidate).iter().map(|x| *x as f32).collect(),
         state: [vx, vy, yaw_rate, roll, roll_rate, pitch].map(|x| x as f32),
-        input: [0.0; 6],
+        input: [0.0; 7],
     };
     let scales = step::scales(&case);
     let push = scales[0] + (vy * yaw_rate).abs();

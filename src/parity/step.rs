@@ -26,8 +26,8 @@ pub struct Case {
     pub table: Vec<f32>,
     /// The state (m/s, m/s, rad/s, rad, rad/s, m/s^2).
     pub state: [f32; 6],
-    /// Wheel speeds (rad/s), steering (rad) and how far the DRS is open.
-    pub input: [f32; 6],
+    /// Wheel speeds (rad/s), steering (rad), how far the DRS is open, and the road's friction.
+    pub input: [f32; 7],
 }
 
 /// A case from the car `model` with every parameter up to a fifth off, and a state that races see. `None` if the
@@ -71,6 +71,7 @@ fn case(model: TyreModel, base: &Car, random: &mut Draws) -> Option<Case> {
         rim(),
         random.within(-0.12, 0.12),
         random.within(0.0, 1.0),
+        random.within(0.3, 1.2),
     ];
     Some(Case {
         table: table.iter().map(|x| *x as f32).collect(),
@@ -120,12 +121,13 @@ impl Case {
 /// The outputs in the scalar `R` of what `at` yields by its place in [`Case::row`].
 #[inline(always)]
 fn outputs<R: Real, T: Tyre<R>>(at: impl Fn(usize) -> R) -> [R; OUTPUTS] {
-    let car = CarModel::<R, T>::from_table(|i| at(12 + i));
+    let car = CarModel::<R, T>::from_table(|i| at(13 + i));
     let state = CarState::from_array(std::array::from_fn(&at));
     let input = CarInput {
         wheel_speed: std::array::from_fn(|i| at(6 + i)),
         steer: at(10),
         flap: at(11),
+        friction: Some(at(12)),
     };
     // A loop as in the kernel, whose count the compiler does not know: it would unroll a lone step of many lanes
     // until it ran out of stack.
@@ -198,8 +200,8 @@ fn on_device(context: &GpuContext, model: TyreModel, cases: &[Case]) -> Result<V
                 given(5u, lane),
             );
             let wheels = vec4<f32>(given(6u, lane), given(7u, lane), given(8u, lane), given(9u, lane));
-            let input = CarInput(wheels, given(10u, lane), given(11u, lane));
-            let step = given(12u, lane);
+            let input = CarInput(wheels, given(10u, lane), given(11u, lane), given(12u, lane));
+            let step = given(13u, lane);
             var first: CarRate;
             var sum = state;
             var reached = state;
@@ -224,7 +226,7 @@ fn on_device(context: &GpuContext, model: TyreModel, cases: &[Case]) -> Result<V
     for i in 0..6 {
         rows.extend(cases.iter().map(|c| c.state[i]));
     }
-    for i in 0..6 {
+    for i in 0..7 {
         rows.extend(cases.iter().map(|c| c.input[i]));
     }
     rows.extend(cases.iter().map(|_| STEP));

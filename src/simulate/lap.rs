@@ -159,11 +159,16 @@ pub fn simulate_lap(car: &Car, circuit: &Circuit, settings: &SimulateSettings) -
     distort(&mut samples, interval, &settings.sensors, settings.seed);
 
     let column = |k: usize| samples.iter().map(|s| s.measured[k]).collect();
-    let road = if lap.loads_mps2.is_empty() {
-        ""
-    } else {
-        " in three dimensions"
-    };
+    let mut road = String::new();
+    if let (Some(relief), Some(facts)) = (&circuit.relief, circuit.relief_facts()) {
+        if !relief.is_level() {
+            road += " in three dimensions";
+        }
+        if !relief.is_dry() {
+            let [least, most] = facts.friction;
+            road += &format!(" with friction of {least:.2} to {most:.2}");
+        }
+    }
     let log = Log {
         source: format!("{} on {}{road}, simulated", car.name, circuit.name),
         dt_s: interval,

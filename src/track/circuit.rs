@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::clothoid::displacement;
 use super::crossing::bridges;
-use super::relief::{Relief, ReliefFacts, cubic};
+use super::relief::{Relief, ReliefFacts, Surface, cubic, mixed};
 use crate::{Error, Result};
 
 /// A named stretch of a circuit.
@@ -209,8 +209,9 @@ impl Circuit {
         (between(&self.width_left_m), between(&self.width_right_m))
     }
 
-    /// Height (m) and banking (rad) at a station, of a road that has them: the cubic through the four samples about it.
-    pub fn relief_at(&self, station_m: f64) -> Option<[f64; 2]> {
+    /// The surface on the centreline at a station, of a road that is not level and dry: height and banking by the cubic through the four
+    /// samples about it, friction linear between two.
+    pub fn relief_at(&self, station_m: f64) -> Option<Surface> {
         let relief = self.relief.as_ref()?;
         let at = self.locate(station_m);
         let n = self.station_m.len();
@@ -221,16 +222,18 @@ impl Circuit {
         };
         let t = at.past_m / self.spacing_m();
         let value = |of: &[f64]| cubic([before, at.before, at.after, after].map(|i| of[i]), t);
-        Some([value(&relief.z_m), value(&relief.bank_rad)])
+        let [friction, per_m] = mixed(relief.friction[at.before], relief.friction[at.after], t);
+        Some([value(&relief.z_m), value(&relief.bank_rad), friction, per_m])
     }
 
     /// What the road's height comes to, if it has one.
     pub fn relief_facts(&self) -> Option<ReliefFacts> {
         let relief = self.relief.as_ref()?;
-        Some(relief.facts(&self.station_m, self.spacing_m(), self.closed))
+        let widths = [self.width_left_m.as_slice(), &self.width_right_m];
+        Some(relief.facts(&self.station_m, widths, self.spacing_m(), self.closed))
     }
 
-    /// Refuses a road in three dimensions, for what would leave its height and banking out.
+    /// Refuses a road that is not level and dry, for what would leave its surface out.
     ///
     /// # Errors
     /// [`Error::Input`] naming what does not know them.
@@ -240,8 +243,8 @@ impl Circuit {
         }
         Err(Error::input(
             &self.name,
-            "height and banking",
-            "a road in three dimensions",
+            "height, banking and friction",
+            "a road that is not level and dry",
             super::relief::level_road(what),
         ))
     }

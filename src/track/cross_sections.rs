@@ -2,7 +2,7 @@
 
 use super::circuit::{Corner, Section};
 use super::crossing::bridges;
-use super::relief::{SectionRelief, cubic, level_road};
+use super::relief::{SectionRelief, Surface, beside, cubic, level_road, mixed};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::ops::Range;
@@ -33,7 +33,7 @@ pub struct CrossSections {
     pub corners: Vec<Corner>,
     /// Whether the DRS may be open from each cross-section to the next. Empty where it may be open nowhere.
     pub drs: Vec<bool>,
-    /// Height and banking of each cross-section; none of a level road.
+    /// Height, banking and friction of each cross-section; none of a level and dry road.
     pub relief: Option<SectionRelief>,
 }
 
@@ -302,9 +302,9 @@ impl CrossSections {
         points_m.iter().map(at).collect()
     }
 
-    /// Height (m) and banking (rad) at each point (m) of a line along the road, of a road that has them: the cubic through the four
-    /// cross-sections about it.
-    pub fn relief_along(&self, points_m: &[DVec2]) -> Option<Vec<[f64; 2]>> {
+    /// The surface at each point (m) of a line along the road, of a road that is not level and dry: height and banking by the cubic
+    /// through the four cross-sections about it, friction linear between two.
+    pub fn relief_along(&self, points_m: &[DVec2]) -> Option<Vec<Surface>> {
         let relief = self.relief.as_ref()?;
         let n = self.len() as isize;
         let index = |i: isize| {
@@ -335,23 +335,24 @@ impl CrossSections {
                 cubic(four.map(|i| relief.foot_m[i].y), t),
             );
             let across = left(four[1]).lerp(left(four[2]), t).normalize_or_zero();
-            [z + bank.tan() * (*point - foot).dot(across), bank]
+            let [friction, per_m] = mixed(relief.friction[four[1]], relief.friction[four[2]], t);
+            beside([z, bank, friction, per_m], (*point - foot).dot(across))
         };
         let nearest = self.nearest_along(points_m);
         Some(points_m.iter().zip(nearest).map(at).collect())
     }
 
-    /// Height (m) and banking (rad) of a line's points (m), one per cross-section, of a road that has them.
-    pub fn relief_of(&self, points_m: &[DVec2]) -> Option<Vec<[f64; 2]>> {
+    /// The surface at a line's points (m), one per cross-section, of a road that is not level and dry.
+    pub fn relief_of(&self, points_m: &[DVec2]) -> Option<Vec<Surface>> {
         let relief = self.relief.as_ref()?;
         let at = |(i, point): (usize, &DVec2)| {
             let left = (self.left_m[i] - self.right_m[i]).normalize_or_zero();
-            [relief.height_m(i, left, *point), relief.bank_rad[i]]
+            relief.at(i, left, *point)
         };
         Some(points_m.iter().enumerate().map(at).collect())
     }
 
-    /// Refuses a road in three dimensions, for what would leave its height and banking out.
+    /// Refuses a road that is not level and dry, for what would leave its surface out.
     ///
     /// # Errors
     /// [`Error::Input`] naming what does not know them.
@@ -359,10 +360,10 @@ impl CrossSections {
         if self.relief.is_none() {
             return Ok(());
         }
-        let found = "a road in three dimensions";
+        let found = "a road that is not level and dry";
         Err(Error::input(
             &self.name,
-            "height and banking",
+            "height, banking and friction",
             found,
             level_road(what),
         ))

@@ -62,6 +62,10 @@ pub(super) fn cross_sections(road: &dyn Road, count: usize) -> Result<CrossSecti
         foot_m: frames.iter().map(|frame| frame.position_m).collect(),
         z_m: frames.iter().map(|frame| frame.relief[0]).collect(),
         bank_rad: frames.iter().map(|frame| frame.relief[1]).collect(),
+        friction: frames
+            .iter()
+            .map(|frame| [frame.relief[2], frame.relief[3]])
+            .collect(),
     });
     Ok(CrossSections {
         reference,

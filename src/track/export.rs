@@ -2,6 +2,7 @@
 
 use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
+use super::relief::{Surface, beside};
 use crate::files::write_new;
 use crate::{Error, Result};
 use glam::DVec2;
@@ -9,18 +10,30 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Points (m) with their distances to the right and the left edge (m) in the racetrack database's format, to the micrometre. On a
-/// road in three dimensions `relief` has height (m) and banking (rad) of each, which follow in columns of their own.
-pub fn racetrack_csv(rows: impl Iterator<Item = (DVec2, f64, f64)>, relief: Option<&[[f64; 2]]>) -> String {
+/// road that is not level and dry `relief` has the surface of each: height and banking follow in columns of their own, and the friction
+/// at both edges where it is not 1 everywhere.
+pub fn racetrack_csv(rows: impl Iterator<Item = (DVec2, f64, f64)>, relief: Option<&[Surface]>) -> String {
     let mut text = "# x_m,y_m,w_tr_right_m,w_tr_left_m".to_owned();
     if relief.is_some() {
         text += ",z_m,bank_deg";
+    }
+    let wet = relief
+        .iter()
+        .any(|surfaces| surfaces.iter().any(|s| [s[2], s[3]] != [1.0, 0.0]));
+    if wet {
+        text += ",friction_left,friction_right";
     }
     text += "\n";
     for (i, (point, right_m, left_m)) in rows.enumerate() {
         // Writing to a string cannot fail.
         let _ = write!(text, "{:.6},{:.6},{right_m:.6},{left_m:.6}", point.x, point.y);
-        if let Some([z_m, bank_rad]) = relief.and_then(|relief| relief.get(i)) {
+        if let Some(surface) = relief.and_then(|relief| relief.get(i)) {
+            let [z_m, bank_rad, ..] = surface;
             let _ = write!(text, ",{z_m:.6},{:.6}", bank_rad.to_degrees());
+            if wet {
+                let [at_left, at_right] = [left_m, -right_m].map(|at| beside(*surface, at)[2]);
+                let _ = write!(text, ",{at_left:.6},{at_right:.6}");
+            }
         }
         text += "\n";
     }
@@ -32,10 +45,10 @@ impl Circuit {
     pub fn to_racetrack_csv(&self) -> String {
         let widths = self.width_right_m.iter().zip(&self.width_left_m);
         let points = self.centreline_m.iter().zip(widths);
-        let relief = self.relief.as_ref().map(|relief| -> Vec<[f64; 2]> {
-            let places = relief.z_m.iter().zip(&relief.bank_rad);
-            places.map(|(z, bank)| [*z, *bank]).collect()
-        });
+        let relief = self
+            .relief
+            .as_ref()
+            .map(|relief| relief.surfaces().collect::<Vec<_>>());
         racetrack_csv(
             points.map(|(&point, (&right, &left))| (point, right, left)),
             relief.as_deref(),

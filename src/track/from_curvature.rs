@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 use super::circuit::{Circuit, Corner, Section};
 use super::clothoid::displacement;
-use super::relief::{Given, Relief};
+use super::relief::{Given, Relief, Surface, beside, between_edges};
 use crate::{Error, Place, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
@@ -30,7 +30,7 @@ const LARGEST_GAP: f64 = 0.03;
 /// A total turn further than this from a whole number of turns is a mistake in the table (rad).
 const LARGEST_TURN_ERROR: f64 = 0.5;
 
-/// Fewest rows of a table with height or banking.
+/// Fewest rows of a table with height, banking or friction.
 const LEAST_RELIEF_ROWS: usize = 5;
 
 /// One row of a [`CurvatureTable`].
@@ -65,7 +65,7 @@ pub struct CurvatureTable {
     pub sections: Vec<Section>,
     /// Stretches where the DRS may be open, as a [`Circuit`] has them.
     pub drs_zones_m: Vec<[f64; 2]>,
-    /// Height and banking at the rows; none of a level road.
+    /// Height, banking and friction at the rows; none of a level and dry road.
     pub relief: Option<Relief>,
 }
 
@@ -171,14 +171,15 @@ impl CurvatureTable {
         let mut line = integrate(&curvature, spacing, self.closed, self.start_heading_rad);
         line.heading.truncate(samples);
         line.position.truncate(samples);
-        let relief = self.relief(&station_m)?;
+        let width_left_m = sample(&|r| r.width_left_m);
+        let width_right_m = sample(&|r| r.width_right_m);
         let circuit = Circuit {
-            relief,
+            relief: self.relief(&station_m, [&width_left_m, &width_right_m])?,
             name: self.name.clone(),
             closed: self.closed,
             length_m: self.length_m,
-            width_left_m: sample(&|r| r.width_left_m),
-            width_right_m: sample(&|r| r.width_right_m),
+            width_left_m,
+            width_right_m,
             station_m,
             centreline_m: line.position,
             heading_rad: line.heading,
@@ -190,35 +191,33 @@ impl CurvatureTable {
         Ok((circuit, closure))
     }
 
-    /// Height and banking at the samples: smooth curves through those at the rows.
-    fn relief(&self, station_m: &[f64]) -> Result<Option<Relief>> {
+    /// Height, banking and friction at the samples: smooth curves through those at the rows.
+    fn relief(&self, station_m: &[f64], [left_m, right_m]: [&[f64]; 2]) -> Result<Option<Relief>> {
         let Some(relief) = &self.relief else {
             return Ok(None);
         };
         if self.rows.len() < LEAST_RELIEF_ROWS {
             let found = format!("{} rows", self.rows.len());
-            let expected = format!("at least {LEAST_RELIEF_ROWS} rows with height or banking");
+            let expected = format!("at least {LEAST_RELIEF_ROWS} rows with height, banking or friction");
             return self.refuse("curvature table", found, &expected);
         }
+        let at_edges = |(row, surface): (&CurvatureRow, Surface)| {
+            [row.width_left_m, -row.width_right_m].map(|at| beside(surface, at)[2])
+        };
         let given = Given {
             z_m: relief.z_m.clone(),
             bank_rad: relief.bank_rad.clone(),
+            friction: self.rows.iter().zip(relief.surfaces()).map(at_edges).collect(),
             gap_m: relief.change.gap_m,
         };
         let Some(smooth) = given.smoothed(&self.knots(), self.closed, [0.0; 2]) else {
             return Ok(None);
         };
         smooth.check(&self.name)?;
-        let (z_m, bank_rad) = station_m
-            .iter()
-            .map(|station| smooth.at(*station))
-            .map(|[z, bank]| (z, bank))
-            .unzip();
-        Ok(Some(Relief {
-            z_m,
-            bank_rad,
-            change: relief.change,
-        }))
+        let stations = station_m.iter().zip(left_m.iter().zip(right_m));
+        let surfaces =
+            stations.map(|(station, (left, right))| between_edges(smooth.at(*station), [*left, *right]));
+        Ok(Some(Relief::of(surfaces, relief.change)))
     }
 
     /// The stations of the rows (m), and of a closed road the end of the lap.

@@ -9,7 +9,10 @@ use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Circuit;
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
-use super::relief::{Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG};
+use super::relief::{
+    FRICTION_COLUMNS, FRICTIONS, Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG, between_edges,
+    friction_columns,
+};
 use super::survey::{Survey, SurveyOptions};
 use crate::config::{folder_of, line_of, read_text};
 use crate::{Error, Place, Result};
@@ -47,6 +50,7 @@ struct CircuitFile {
     flat: bool,
     smoothing_height_m: Option<Spanned<f64>>,
     smoothing_bank_deg: Option<Spanned<f64>>,
+    friction: Option<Spanned<f64>>,
     #[serde(default)]
     sections: Vec<SectionEntry>,
     #[serde(default)]
@@ -95,13 +99,14 @@ impl Circuit {
     /// `station_m`.
     ///
     /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
-    /// wanted, `width_left_m`, `width_right_m`, `corner`, `z_m`, `bank_deg`), `length_m`; `closed` (default true),
+    /// wanted, `width_left_m`, `width_right_m`, `corner`, `z_m`, `bank_deg`, and `friction` or `friction_left` and
+    /// `friction_right`), `length_m`; `closed` (default true),
     /// `start_heading_deg` (0), `width_m` (of the whole road, where the table has no widths), `[[sections]]` with `name`,
     /// `start_m`, `end_m`, and `[[drs_zones]]` with `start_m` and `end_m`, where the DRS may be open; one whose end lies before
     /// its start passes the start line.
     ///
-    /// Both have `smoothing_height_m` and `smoothing_bank_deg` as in [`Smoothing`], and `flat`, which leaves height and banking
-    /// out.
+    /// Both have `smoothing_height_m` and `smoothing_bank_deg` as in [`Smoothing`], `friction` of the whole road (a share of the car's own)
+    /// where no column tells it, and `flat`, which leaves height, banking and friction out.
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be read; [`Error::Input`] with the file, line and field when
@@ -195,7 +200,15 @@ fn assemble(
         smoothing(&file.smoothing_height_m, "smoothing_height_m", usual.height_m)?,
         smoothing(&file.smoothing_bank_deg, "smoothing_bank_deg", usual.bank_deg)?.to_radians(),
     ];
-    let (rows, given) = parse_table(table_file, csv, length_m, file.closed, width_m)?;
+    let (rows, mut given) = parse_table(table_file, csv, length_m, file.closed, width_m)?;
+    let friction = file
+        .friction
+        .as_ref()
+        .map(|f| check.within(f, "friction", FRICTIONS.0, FRICTIONS.1))
+        .transpose()?;
+    if let Some(friction) = friction.filter(|_| given.friction.is_empty()) {
+        given.friction = vec![[friction; 2]; rows.len()];
+    }
     let mut table = CurvatureTable {
         rows,
         name: check.name(&file.name, "name")?,
@@ -212,7 +225,7 @@ fn assemble(
     Ok(table)
 }
 
-/// Height and banking of a table's rows, closed and smoothed within these deviations (m, rad); nothing of a level road.
+/// Height, banking and friction of a table's rows, closed and smoothed within these deviations (m, rad); nothing of a level road.
 fn smooth_relief(
     table: &CurvatureTable,
     mut given: Given,
@@ -226,6 +239,7 @@ fn smooth_relief(
         return Ok((!level).then_some(Relief {
             z_m: given.z_m,
             bank_rad: given.bank_rad,
+            friction: vec![[1.0, 0.0]; table.rows.len()],
             change: ReliefChange::default(),
         }));
     }
@@ -234,17 +248,15 @@ fn smooth_relief(
     }
     let smooth = given.smoothed(&knots, table.closed, within);
     Ok(smooth.map(|smooth| {
-        let rows = table.rows.iter().map(|row| smooth.at(row.station_m));
-        let (z_m, bank_rad) = rows.map(|[z, bank]| (z, bank)).unzip();
-        Relief {
-            z_m,
-            bank_rad,
-            change: smooth.change,
-        }
+        let at = |row: &CurvatureRow| {
+            between_edges(smooth.at(row.station_m), [row.width_left_m, row.width_right_m])
+        };
+        let rows = table.rows.iter().map(at);
+        Relief::of(rows, smooth.change)
     }))
 }
 
-const COLUMNS: [&str; 7] = [
+const COLUMNS: [&str; 10] = [
     "station_m",
     "curvature_1pm",
     "width_left_m",
@@ -252,6 +264,9 @@ const COLUMNS: [&str; 7] = [
     "corner",
     "z_m",
     "bank_deg",
+    "friction",
+    "friction_left",
+    "friction_right",
 ];
 
 /// The line of the row at this position. The reader's own count is that of the comments and empty lines before the row.
@@ -303,7 +318,18 @@ fn parse_table(
             }
         }
     }
-    let [station, curvature, left, right, corner, height, bank] = column;
+    let [
+        station,
+        curvature,
+        left,
+        right,
+        corner,
+        height,
+        bank,
+        friction,
+        at_left,
+        at_right,
+    ] = column;
     let missing = |name: &str, found: &str| {
         let place = Place::line(header_line).column(name);
         Error::input(file, place, found, "this column")
@@ -315,6 +341,9 @@ fn parse_table(
             return Err(missing(name, "neither it nor width_m in the TOML file"));
         }
     }
+
+    let frictions = friction_columns([friction, at_left, at_right])
+        .map_err(|found| Error::input(file, Place::line(header_line), found, FRICTION_COLUMNS))?;
 
     let mut rows: Vec<CurvatureRow> = Vec::new();
     let mut given = Given::default();
@@ -367,6 +396,11 @@ fn parse_table(
         if let Some(bank) = bank {
             let bank_deg = number(bank, (-STEEPEST_BANK_DEG, STEEPEST_BANK_DEG))?;
             given.bank_rad.push(bank_deg.to_radians());
+        }
+        if let Some([left, right]) = frictions {
+            given
+                .friction
+                .push([number(left, FRICTIONS)?, number(right, FRICTIONS)?]);
         }
     }
     Ok((rows, given))

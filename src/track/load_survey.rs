@@ -8,6 +8,7 @@ use toml::Spanned;
 use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Corner;
 use super::reference::Smoothing;
+use super::relief::FRICTIONS;
 use super::survey::{Survey, SurveyOptions};
 use crate::Result;
 use crate::config::folder_of;
@@ -28,6 +29,7 @@ struct SurveyFile {
     smoothing_edges_m: Option<Spanned<f64>>,
     smoothing_height_m: Option<Spanned<f64>>,
     smoothing_bank_deg: Option<Spanned<f64>>,
+    friction: Option<Spanned<f64>>,
     #[serde(default)]
     sections: Vec<SectionEntry>,
     #[serde(default)]
@@ -78,6 +80,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
     let mut survey = Survey::read(beside, &options)?;
     if let Some(name) = &file.name {
         survey.name = check.name(name, "name")?;
+    }
+    if let Some(friction) = within(&file.friction, "friction", FRICTIONS.0, FRICTIONS.1)?
+        && survey.friction.is_empty()
+        && !file.flat
+    {
+        survey.friction = vec![[friction; 2]; survey.centre_m.len()];
     }
     if !(file.sections.is_empty() && file.corners.is_empty() && file.drs_zones.is_empty()) {
         let length_m = survey.smoothed(&smoothing)?.length_m();

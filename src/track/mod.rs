@@ -33,7 +33,7 @@ pub use from_curvature::{Closure, CurvatureRow, CurvatureTable};
 pub use load::BUNDLED;
 pub use reference::{ReferenceLine, Smoothing};
 pub(crate) use relief::interpolated;
-pub use relief::{Relief, ReliefChange, ReliefFacts, SectionRelief};
+pub use relief::{LEVEL_AND_DRY, Relief, ReliefChange, ReliefFacts, SectionRelief, Surface};
 pub use shapes::Shape;
 pub use source::Track;
 pub use spline::Deviation;

@@ -4,7 +4,7 @@ use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
 use super::cutting::cross_sections;
 use super::from_curvature::Closure;
-use super::relief::{Given, ReliefChange, SmoothRelief};
+use super::relief::{Given, LEVEL_AND_DRY, ReliefChange, SmoothRelief, between_edges};
 use super::road::{Road, RoadFrame, circuit};
 use super::spline::{Deviation, Spline};
 use super::survey::Survey;
@@ -190,6 +190,7 @@ impl Survey {
         let given = Given {
             z_m: self.z_m.clone(),
             bank_rad: self.bank_deg.iter().map(|bank| bank.to_radians()).collect(),
+            friction: self.friction.clone(),
             gap_m: self.height_gap_m,
         };
         let relief = given.smoothed(knots, self.closed, within);
@@ -336,13 +337,16 @@ impl Road for ReferenceLine {
         let (i, t) = self.locate(station_m);
         let jet = self.line.on(i, t);
         let speed = jet.first.length();
+        let [left_m, right_m] = [&self.left, &self.right].map(|side| side.at(&self.line.knots, i, t));
         RoadFrame {
             position_m: jet.value,
             tangent: jet.first.normalize_or_zero(),
             curvature_1pm: jet.first.perp_dot(jet.second) / speed.powi(3).max(1e-300),
-            left_m: self.left.at(&self.line.knots, i, t),
-            right_m: self.right.at(&self.line.knots, i, t),
-            relief: self.relief.as_ref().map_or([0.0; 2], |relief| relief.on(i, t)),
+            left_m,
+            right_m,
+            relief: self.relief.as_ref().map_or(LEVEL_AND_DRY, |relief| {
+                between_edges(relief.on(i, t), [left_m, right_m])
+            }),
         }
     }
 

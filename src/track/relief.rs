@@ -1,8 +1,9 @@
-//! Height and banking of roads in three dimensions.
+//! Height, banking and friction of roads.
 //!
-//! The plan view of a road is a matter of [`Circuit`](super::Circuit) and [`CrossSections`](super::CrossSections). Height and
-//! banking are added to it: the height of the reference line, and the angle about the direction of driving by which the left
-//! side of the road lies above the right. A level road without banking has no relief at all, so its laps are those of the plane.
+//! The plan view of a road is a matter of [`Circuit`](super::Circuit) and [`CrossSections`](super::CrossSections). Its surface is
+//! added to it: the height of the reference line, the angle about the direction of driving by which the left side of the road lies
+//! above the right, and the friction, as a share of what the car's own tyres have. A level and dry road has no relief at all, so its
+//! laps are those of the plane.
 
 use super::spline::Spline;
 use crate::{Error, Place, Result};
@@ -26,6 +27,17 @@ const LONGEST_WAVE_M: f64 = 150.0;
 /// The same of the banking (m).
 const LONGEST_BANK_WAVE_M: f64 = 100.0;
 
+/// Range of the friction, as a share of that of the car's own tyres: from wet ice to a surface better than the one that they were
+/// measured on.
+pub(super) const FRICTIONS: (f64, f64) = (0.05, 1.5);
+
+/// A road's surface at a place: height (m), banking (rad, the left side up), friction as a share of the car's own, and what that
+/// gains per metre to the left (1/m).
+pub type Surface = [f64; 4];
+
+/// The surface of a level and dry road.
+pub const LEVEL_AND_DRY: Surface = [0.0, 0.0, 1.0, 0.0];
+
 /// What smoothing and closing changed of a road's height and banking.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReliefChange {
@@ -39,13 +51,15 @@ pub struct ReliefChange {
     pub gap_m: f64,
 }
 
-/// Height and banking at the samples of a [`Circuit`](super::Circuit).
+/// Height, banking and friction at the samples of a [`Circuit`](super::Circuit).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Relief {
     /// Height of the centreline (m).
     pub z_m: Vec<f64>,
     /// Angle about the direction of driving by which the left side lies above the right (rad).
     pub bank_rad: Vec<f64>,
+    /// Friction on the centreline as a share of the car's own, and what it gains per metre to the left (1/m).
+    pub friction: Vec<[f64; 2]>,
     /// What was changed of what was given.
     pub change: ReliefChange,
 }
@@ -65,11 +79,51 @@ pub struct ReliefFacts {
     pub bank_rad: f64,
     /// Where that is (m).
     pub bank_at_m: f64,
+    /// The least and the greatest friction on the road, as a share of the car's own.
+    pub friction: [f64; 2],
 }
 
 impl Relief {
-    /// What it comes to at stations (m) of a road that is closed or not.
-    pub fn facts(&self, station_m: &[f64], spacing_m: f64, closed: bool) -> ReliefFacts {
+    /// The relief of these surfaces.
+    pub(crate) fn of(surfaces: impl Iterator<Item = Surface>, change: ReliefChange) -> Self {
+        let mut relief = Self {
+            z_m: Vec::new(),
+            bank_rad: Vec::new(),
+            friction: Vec::new(),
+            change,
+        };
+        for [z_m, bank_rad, friction, per_m] in surfaces {
+            relief.z_m.push(z_m);
+            relief.bank_rad.push(bank_rad);
+            relief.friction.push([friction, per_m]);
+        }
+        relief
+    }
+
+    /// Its surfaces.
+    pub(crate) fn surfaces(&self) -> impl Iterator<Item = Surface> {
+        let heights = self.z_m.iter().zip(&self.bank_rad).zip(&self.friction);
+        heights.map(|((z, bank), [friction, per_m])| [*z, *bank, *friction, *per_m])
+    }
+
+    /// Whether it is all of one height, without banking.
+    pub fn is_level(&self) -> bool {
+        is_level(&self.z_m, &self.bank_rad)
+    }
+
+    /// Whether the friction is the car's own everywhere.
+    pub fn is_dry(&self) -> bool {
+        is_dry(&self.friction)
+    }
+
+    /// What it comes to at stations (m) of a road that is closed or not, whose left and right edges are so far from the centreline (m).
+    pub fn facts(
+        &self,
+        station_m: &[f64],
+        [left_m, right_m]: [&[f64]; 2],
+        spacing_m: f64,
+        closed: bool,
+    ) -> ReliefFacts {
         let n = self.z_m.len();
         let steps = n - usize::from(!closed);
         let rise = |i: &usize| self.z_m[(i + 1) % n] - self.z_m[*i];
@@ -83,7 +137,16 @@ impl Relief {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), z| {
                 (least.min(*z), most.max(*z))
             });
+        let edges = left_m.iter().zip(right_m).zip(&self.friction);
+        let frictions = edges.flat_map(|((left, right), &[friction, per_m])| {
+            let level = [0.0, 0.0, friction, per_m];
+            [*left, -right].map(|at| beside(level, at)[2])
+        });
+        let friction = frictions.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], f| {
+            [least.min(f), most.max(f)]
+        });
         ReliefFacts {
+            friction,
             climb_m: (0..steps).map(|i| rise(&i).max(0.0)).sum(),
             range_m: ends.1 - ends.0,
             gradient: rise(&steepest).abs() / spacing_m,
@@ -94,15 +157,17 @@ impl Relief {
     }
 }
 
-/// Planes across a road: height and banking at each of its [`CrossSections`](super::CrossSections).
+/// Planes across a road: height, banking and friction at each of its [`CrossSections`](super::CrossSections).
 #[derive(Clone, Debug, PartialEq)]
 pub struct SectionRelief {
     /// A point of each cross-section (m),
     pub foot_m: Vec<DVec2>,
     /// its height (m),
     pub z_m: Vec<f64>,
-    /// and the angle about the direction of driving by which the cross-section rises to the left (rad).
+    /// the angle about the direction of driving by which the cross-section rises to the left (rad),
     pub bank_rad: Vec<f64>,
+    /// and the friction there with what it gains per metre to the left (1/m).
+    pub friction: Vec<[f64; 2]>,
 }
 
 impl SectionRelief {
@@ -111,33 +176,99 @@ impl SectionRelief {
         Self {
             foot_m: of.clone().map(|i| self.foot_m[i]).collect(),
             z_m: of.clone().map(|i| self.z_m[i]).collect(),
-            bank_rad: of.map(|i| self.bank_rad[i]).collect(),
+            bank_rad: of.clone().map(|i| self.bank_rad[i]).collect(),
+            friction: of.map(|i| self.friction[i]).collect(),
         }
     }
 
-    /// The height (m) of a point of cross-section `i`, whose leftward unit vector is `left`.
-    pub fn height_m(&self, i: usize, left: DVec2, point: DVec2) -> f64 {
-        self.z_m[i] + self.bank_rad[i].tan() * (point - self.foot_m[i]).dot(left)
+    /// Whether it is all of one height, without banking.
+    pub fn is_level(&self) -> bool {
+        is_level(&self.z_m, &self.bank_rad)
+    }
+
+    /// Whether the friction is the car's own everywhere.
+    pub fn is_dry(&self) -> bool {
+        is_dry(&self.friction)
+    }
+
+    /// The surface at a point (m) of cross-section `i`, whose leftward unit vector is `left`.
+    pub fn at(&self, i: usize, left: DVec2, point: DVec2) -> Surface {
+        let [friction, per_m] = self.friction[i];
+        let foot = [self.z_m[i], self.bank_rad[i], friction, per_m];
+        beside(foot, (point - self.foot_m[i]).dot(left))
     }
 }
 
-/// Heights and bankings as read, at the points of a line.
+fn is_level(z_m: &[f64], bank_rad: &[f64]) -> bool {
+    let first = z_m.first().copied().unwrap_or_default();
+    z_m.iter().all(|z| (z - first).abs() <= LEVEL_M) && bank_rad.iter().all(|bank| bank.abs() <= LEVEL_RAD)
+}
+
+fn is_dry(friction: &[[f64; 2]]) -> bool {
+    friction.iter().all(|friction| *friction == [1.0, 0.0])
+}
+
+/// The surface so far (m) to the left of a place whose surface is known.
+pub(super) fn beside([z_m, bank_rad, friction, per_m]: Surface, left_m: f64) -> Surface {
+    let friction = friction + per_m * left_m;
+    [
+        z_m + bank_rad.tan() * left_m,
+        bank_rad,
+        friction.clamp(FRICTIONS.0, FRICTIONS.1),
+        per_m,
+    ]
+}
+
+/// Height (m), banking (rad), and friction at the left and at the right edge.
+pub(super) type ToEdges = [f64; 4];
+
+/// The surface of a reference line from that up to edges which are so far to its left and right (m).
+pub(super) fn between_edges(
+    [z_m, bank_rad, at_left, at_right]: ToEdges,
+    [left_m, right_m]: [f64; 2],
+) -> Surface {
+    let width_m = left_m + right_m;
+    if width_m <= 0.0 {
+        return [z_m, bank_rad, 0.5 * (at_left + at_right), 0.0];
+    }
+    let per_m = (at_left - at_right) / width_m;
+    [z_m, bank_rad, at_right + per_m * right_m, per_m]
+}
+
+/// What a table may say of friction.
+pub(super) const FRICTION_COLUMNS: &str = "friction, or both friction_left and friction_right";
+
+/// The columns of the friction at the left and at the right edge, from those of `friction`, `friction_left` and `friction_right`.
+///
+/// # Errors
+/// What was found where it is neither of the two.
+pub(super) fn friction_columns(found: [Option<usize>; 3]) -> Result<Option<[usize; 2]>, &'static str> {
+    match found {
+        [None, None, None] => Ok(None),
+        [Some(whole), None, None] => Ok(Some([whole; 2])),
+        [None, Some(left), Some(right)] => Ok(Some([left, right])),
+        [Some(_), ..] => Err("friction beside friction_left or friction_right"),
+        _ => Err("one of friction_left and friction_right"),
+    }
+}
+
+/// Heights, bankings and frictions as read, at the points of a line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Given {
     /// Heights (m), or none.
     pub z_m: Vec<f64>,
     /// Banking (rad), or none.
     pub bank_rad: Vec<f64>,
+    /// Friction at the left and at the right edge, or none.
+    pub friction: Vec<[f64; 2]>,
     /// The gap in height that was spread (m).
     pub gap_m: f64,
 }
 
 impl Given {
-    /// Whether there is nothing that a level road lacks.
+    /// Whether there is nothing that a level and dry road lacks.
     pub fn is_level(&self) -> bool {
-        let first = self.z_m.first().copied().unwrap_or_default();
-        self.z_m.iter().all(|z| (z - first).abs() <= LEVEL_M)
-            && self.bank_rad.iter().all(|bank| bank.abs() <= LEVEL_RAD)
+        is_level(&self.z_m, &self.bank_rad) && self.friction.iter().all(|friction| *friction == [1.0; 2])
     }
 
     /// Closes the heights at these stations of a closed line of this length (m). The last row of a line that repeats its first
@@ -147,6 +278,7 @@ impl Given {
     /// [`Error::Input`] for a gap that no measuring error explains.
     pub fn close(&mut self, source: &str, points: usize, station_m: &[f64], length_m: f64) -> Result<()> {
         self.bank_rad.truncate(points);
+        self.friction.truncate(points);
         if self.z_m.len() < points || points < 2 {
             return Ok(());
         }
@@ -179,7 +311,8 @@ impl Given {
         Ok(())
     }
 
-    /// Smooth curves within these deviations of the figures (m, rad), over the knots of the line; nothing of a level road.
+    /// Smooth curves within these deviations of the figures (m, rad), over the knots of the line, and the friction, linear between
+    /// them; nothing of a level and dry road.
     pub fn smoothed(
         &self,
         knots: &[f64],
@@ -213,28 +346,49 @@ impl Given {
         if !self.bank_rad.is_empty() {
             change.bank_rad = bank.deviation(&self.bank_rad).greatest_m;
         }
-        Some(SmoothRelief { height, bank, change })
+        let mut friction = self.friction.clone();
+        friction.resize(points, [1.0; 2]);
+        if closed {
+            friction.push(friction[0]);
+        }
+        Some(SmoothRelief {
+            height,
+            bank,
+            friction,
+            change,
+        })
     }
 }
 
-/// Height (m) and banking (rad) along a line, as functions of its parameter.
+/// The surface along a line, as a function of its parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SmoothRelief {
     height: Spline<f64>,
     bank: Spline<f64>,
+    /// At the knots, at the left and at the right edge.
+    friction: Vec<[f64; 2]>,
     /// What was changed.
     pub change: ReliefChange,
 }
 
 impl SmoothRelief {
-    /// Height (m) and banking (rad) on an interval of the line.
-    pub fn on(&self, interval: usize, t: f64) -> [f64; 2] {
-        [self.height.on(interval, t).value, self.bank.on(interval, t).value]
+    /// The surface on an interval of the line.
+    pub fn on(&self, interval: usize, t: f64) -> ToEdges {
+        let (from, to) = (self.height.knots[interval], self.height.knots[interval + 1]);
+        let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
+        let [at_left, at_right] = mixed(self.friction[interval], self.friction[interval + 1], share);
+        [
+            self.height.on(interval, t).value,
+            self.bank.on(interval, t).value,
+            at_left,
+            at_right,
+        ]
     }
 
-    /// Height (m) and banking (rad) at a parameter.
-    pub fn at(&self, t: f64) -> [f64; 2] {
-        [self.height.at(t).value, self.bank.at(t).value]
+    /// The surface at a parameter.
+    pub fn at(&self, t: f64) -> ToEdges {
+        let t = self.height.wrap(t);
+        self.on(self.height.interval(t), t)
     }
 
     /// Refuses a road that is too steep anywhere.
@@ -261,10 +415,16 @@ impl SmoothRelief {
     }
 }
 
-/// What is asked for where height and banking are not known.
+/// Both figures of a friction, `share` of the way from one to another.
+pub(super) fn mixed(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
+    [0, 1].map(|k| from[k] + share * (to[k] - from[k]))
+}
+
+/// What is asked for where the surface is not known.
 pub(super) fn level_road(what: &str) -> String {
     format!(
-        "a level road: {what} would leave height and banking out; a TOML file of the road with `flat = true` does so knowingly"
+        "a level road: {what} would leave height, banking and friction out; a TOML file of the road with `flat = true` does so \
+         knowingly"
     )
 }
 
@@ -347,6 +507,61 @@ mod tests {
         assert!(road.level_only("this").is_err() && stretch.level_only("this").is_err());
     }
 
+    /// Friction at both edges is linear across the road and between the rows, and comes back from an exported file.
+    #[test]
+    fn friction_comes_through_to_the_cross_sections() {
+        let wet = |angle: f64| if (1.0..2.0).contains(&angle) { 0.5 } else { 1.0 };
+        let text = circle(
+            ",friction_left,friction_right",
+            |angle| format!(",{},1", wet(angle)),
+            None,
+        );
+        let reference = survey(&text).unwrap().smoothed(&Smoothing::default()).unwrap();
+        let (circuit, _) = reference.circuit().unwrap();
+        let relief = circuit.relief.as_ref().unwrap();
+        assert!(relief.is_level() && !relief.is_dry());
+        let [least, most] = circuit.relief_facts().unwrap().friction;
+        assert!(
+            (least - 0.5).abs() < 1e-3 && (most - 1.0).abs() < 1e-9,
+            "{least} {most}"
+        );
+        let of = |road: &crate::track::CrossSections, angle: f64, alpha: f64| {
+            let i = (angle / TAU * 240.0).round() as usize;
+            road.relief_of(&road.points(&vec![alpha; 240])).unwrap()[i][2]
+        };
+        let road = circuit.cross_sections(240).unwrap();
+        let narrow = road.narrowed(2.0).unwrap();
+        for (angle, alpha, wanted) in [
+            (1.5, 1.0, 0.5),
+            (1.5, 0.5, 0.75),
+            (1.5, 0.0, 1.0),
+            (4.0, 1.0, 1.0),
+        ] {
+            let found = of(&road, angle, alpha);
+            assert!((found - wanted).abs() < 2e-3, "{angle}, {alpha}: {found}");
+        }
+        // A car of 2 m has its middle a metre from the edge of 10 m of road.
+        assert!((of(&narrow, 1.5, 1.0) - 0.55).abs() < 2e-3);
+        let middle = narrow.points(&[0.7; 240]);
+        let along = road.relief_along(&middle).unwrap();
+        for (own, found) in narrow.relief_of(&middle).unwrap().iter().zip(&along) {
+            assert!((own[2] - found[2]).abs() < 1e-3, "{own:?} {found:?}");
+        }
+        let written = circuit.to_racetrack_csv();
+        let again = survey(&written).unwrap().smoothed(&Smoothing::default()).unwrap();
+        let again = again.circuit().unwrap().0.cross_sections(240).unwrap();
+        for angle in [0.5, 1.5, 2.5, 4.0] {
+            let [before, after] = [&road, &again].map(|road| of(road, angle, 0.8));
+            assert!((before - after).abs() < 2e-3, "{angle}: {before} {after}");
+        }
+        // One column is both edges'; dry is no surface at all.
+        let whole = survey(&circle(",friction", |_| ",0.6".to_owned(), None)).unwrap();
+        assert!(whole.friction.iter().all(|f| *f == [0.6; 2]));
+        let dry = survey(&circle(",friction", |_| ",1".to_owned(), None)).unwrap();
+        let (dry, _) = dry.smoothed(&Smoothing::default()).unwrap().circuit().unwrap();
+        assert!(dry.relief.is_none());
+    }
+
     #[test]
     fn a_level_road_has_no_relief() {
         let plain = survey(&circle("", |_| String::new(), None)).unwrap();
@@ -403,6 +618,14 @@ mod tests {
                 "a number from -40 to 40",
             ),
             (circle(",z_m", |_| ",high".to_owned(), None), "column 5 (z_m)"),
+            (
+                circle(",friction", |_| ",0".to_owned(), None),
+                "a number from 0.05 to 1.5",
+            ),
+            (
+                circle(",friction_left", |_| ",1".to_owned(), None),
+                "both friction_left and friction_right",
+            ),
         ] {
             let error = survey(&text).unwrap_err().to_string();
             assert!(error.contains(wanted), "{error}");

@@ -2,7 +2,7 @@
 
 use super::circuit::{Circuit, Corner, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
-use super::relief::{Relief, ReliefChange};
+use super::relief::{LEVEL_AND_DRY, Relief, ReliefChange, Surface};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 
@@ -23,7 +23,7 @@ pub(super) struct RoadFrame {
     /// Distance to the right edge (m).
     pub right_m: f64,
     /// Height (m) and banking (rad); zero on a level road.
-    pub relief: [f64; 2],
+    pub relief: Surface,
 }
 
 /// A road along a smooth reference line.
@@ -73,7 +73,7 @@ impl Road for Circuit {
             curvature_1pm: self.curvature_at(station_m),
             left_m,
             right_m,
-            relief: self.relief_at(station_m).unwrap_or_default(),
+            relief: self.relief_at(station_m).unwrap_or(LEVEL_AND_DRY),
         }
     }
 
@@ -159,18 +159,11 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
     }
     circuit.corners = road.corners().to_vec();
     circuit.relief = road.relief_change().map(|change| {
-        let at = |station: &f64| road.frame(*station).relief;
-        let (z_m, bank_rad) = circuit
+        let surfaces = circuit
             .station_m
             .iter()
-            .map(at)
-            .map(|[z, bank]| (z, bank))
-            .unzip();
-        Relief {
-            z_m,
-            bank_rad,
-            change,
-        }
+            .map(|station| road.frame(*station).relief);
+        Relief::of(surfaces, change)
     });
     Ok((circuit, closure))
 }

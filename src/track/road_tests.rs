@@ -38,6 +38,7 @@ fn survey(points: Vec<DVec2>, closed: bool, width_m: f64) -> Survey {
         bridges: 0,
         z_m: Vec::new(),
         bank_deg: Vec::new(),
+        friction: Vec::new(),
         height_gap_m: 0.0,
     }
 }

@@ -16,6 +16,8 @@ pub struct CarInput<R> {
     pub steer: R,
     /// How far the DRS is open, from 0 to 1.
     pub flap: R,
+    /// Friction of the road as a share of that of the car's own tyres; none where it is theirs.
+    pub friction: Option<R>,
 }
 
 /// The state of the car.
@@ -204,7 +206,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
                     side,
                 };
             }
-            let forces = self.tyres[axle].axle_forces(inputs);
+            let forces = self.tyres[axle].axle_forces_on(inputs, input.friction);
             // The rear axle comes last, and its wheels do not steer.
             rear_force = forces[0].x + forces[1].x;
             for half in 0..2 {

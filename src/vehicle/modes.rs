@@ -156,6 +156,7 @@ fn linearised_on<T: Tyre<f64>>(flat: &[f64], speed: f64, wheels: Wheels) -> Opti
                     wheel_speed,
                     steer,
                     flap: 0.0,
+                    friction: None,
                 },
             )
             .state;

@@ -240,6 +240,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
                 wheel_speed,
                 steer,
                 flap: zero,
+                friction: None,
             },
         );
         let residual = [
@@ -352,6 +353,7 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
             wheel_speed,
             steer: -chassis.steer_offset / chassis.steer_scale,
             flap: 0.0,
+            friction: None,
         };
         // Load transfer and force depend on each other. The iteration converges, since a change of one changes the other by a
         // sixth at most.

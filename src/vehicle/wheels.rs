@@ -115,7 +115,7 @@ fn at<T: Tyre<f64>>(
                     side: sides[half],
                 }
             });
-            let forces = car.tyres[axle].axle_forces(inputs);
+            let forces = car.tyres[axle].axle_forces_on(inputs, input.friction);
             [0, 1].map(|half| Wheel {
                 load_n: inputs[half].load,
                 slip_ratio: inputs[half].slip_ratio,
@@ -161,6 +161,7 @@ mod tests {
             wheel_speed: [40.0 / 0.33, 40.5 / 0.33, 41.0 / 0.33, 41.5 / 0.33],
             steer: 0.03,
             flap: 1.0,
+            friction: None,
         };
         let [moment] = moments_of(&car, &[(state, input)])[..] else {
             panic!("one moment")

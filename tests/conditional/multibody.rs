@@ -94,6 +94,7 @@ impl Manoeuvre {
             wheel_speed: [w0, w1, w2, w3],
             steer,
             flap: 0.0,
+            friction: None,
         }
     }
 

@@ -33,11 +33,11 @@ const MODELS: [TyreModel; 2] = [TyreModel::MagicFormula, TyreModel::Linear];
 /// mirror image, its tyres' own left-right differences apart.
 fn mirrored(case: &Case) -> Case {
     let [vx, vy, r, phi, p, pitch] = case.state;
-    let [fl, fr, rl, rr, steer, flap] = case.input;
+    let [fl, fr, rl, rr, steer, flap, friction] = case.input;
     Case {
         table: case.table.clone(),
         state: [vx, -vy, -r, -phi, -p, pitch],
-        input: [fr, fl, rr, rl, -steer, flap],
+        input: [fr, fl, rr, rl, -steer, flap, friction],
     }
 }
 

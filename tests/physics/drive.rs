@@ -44,6 +44,7 @@ fn banked(radius_m: f64, bank_rad: f64) -> Circuit {
     circuit.relief = Some(Relief {
         z_m: vec![0.0; n],
         bank_rad: vec![bank_rad; n],
+        friction: vec![[1.0, 0.0]; n],
         change: ReliefChange::default(),
     });
     circuit
@@ -104,6 +105,7 @@ fn a_road_of_no_height_drives_as_a_level_one() {
     zero.relief = Some(Relief {
         z_m: vec![40.0; n],
         bank_rad: vec![0.0; n],
+        friction: vec![[1.0, 0.0]; n],
         change: ReliefChange::default(),
     });
     let settings = DriverSettings {
@@ -121,6 +123,49 @@ fn a_road_of_no_height_drives_as_a_level_one() {
             assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
     }
+}
+
+/// A circle of 100 m, driven to the left, of this friction on its middle that gains so much per metre to the left.
+fn slippery(friction: [f64; 2]) -> Circuit {
+    let mut circuit = banked(100.0, 0.0);
+    let relief = circuit.relief.as_mut().expect("a surface");
+    relief.friction.fill(friction);
+    circuit
+}
+
+/// At half of the friction the bundled car no longer gets round a bend that asks for 10 m/s^2, and gets round one that asks for 5, with
+/// wheels that push as hard as on the dry road and slip more.
+#[test]
+fn a_slippery_road_holds_less_and_slips_more() {
+    let car = bundled_car();
+    let driven = |friction: [f64; 2], ay: f64| {
+        let circuit = slippery(friction);
+        let plan = SpeedPlan::of_speeds(&[0.0], &[(ay * 100.0f64).sqrt()], circuit.length_m);
+        drive_planned(&car, &circuit, plan, &DriverSettings::default(), 0.05)
+    };
+    assert!(driven([1.0, 0.0], 10.0).is_ok());
+    assert!(driven([0.5, 0.0], 10.0).is_err());
+    let [dry, wet] = [1.0, 0.5].map(|friction| {
+        let drive = driven([friction, 0.0], 5.0).expect("it gets round");
+        let last = drive.states.len() - 1;
+        assert_eq!(drive.inputs[last].friction, Some(friction));
+        let state = CarState::from_array(drive.states[last]);
+        moments_under(&car, &[(state, drive.inputs[last])], &[drive.loads_mps2[last]])[0]
+    });
+    assert!((wet.ay_mps2 / dry.ay_mps2 - 1.0).abs() < 0.02, "{wet:?} {dry:?}");
+    for (wet, dry) in wet.wheels.iter().zip(&dry.wheels) {
+        let [pushes, slips] = [
+            wet.lateral_n / dry.lateral_n,
+            wet.slip_angle_rad / dry.slip_angle_rad,
+        ];
+        assert!((pushes - 1.0).abs() < 0.05 && slips > 1.05, "{pushes} {slips}");
+    }
+    // What the road gains to the left, the car has where it drives there.
+    let leaning = driven([0.7, 0.05], 5.0).expect("it gets round");
+    let last = leaning.states.len() - 1;
+    let wanted = 0.7 + 0.05 * leaning.offset_m[last];
+    let found = leaning.inputs[last].friction.expect("a friction");
+    assert!((found - wanted).abs() < 2e-3, "{found} for {wanted}");
 }
 
 /// Rolling without drive or drag over a hill, the car loses the speed that the height takes: `v^2 = v0^2 - 2 g z`. Rolling
@@ -143,6 +188,7 @@ fn a_rolling_car_gives_speed_for_height() {
             wheel_speed: [front, front, rear, rear],
             steer: 0.0,
             flap: 0.0,
+            friction: None,
         };
         let before = state.body.vx;
         state = runge_kutta_step_on(

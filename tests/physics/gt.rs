@@ -40,6 +40,7 @@ fn inputs(model: &GtModel, state: &CarState<f64>, steer: f64, drive: f64) -> Car
         wheel_speed: [front(wf), front(-wf), rear(wr), rear(-wr)],
         steer,
         flap: 0.0,
+        friction: None,
     }
 }
 

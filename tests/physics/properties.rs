@@ -294,6 +294,7 @@ fn rates<R: lapswarm::scalar::Real>(variables: &[R; 12], parameters: &[R], freed
         wheel_speed: std::array::from_fn(|i| variables[6 + i]),
         steer: variables[10],
         flap: R::lit(0.4),
+        friction: None,
     };
     let rate = model.rate(&state, &input);
     [&rate.state.to_array()[..], &[rate.ax, rate.ay]].concat()

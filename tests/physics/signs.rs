@@ -62,6 +62,7 @@ fn rolling(vx: f64, steer: f64) -> CarInput<f64> {
         wheel_speed: [front, front, vx / 0.3, vx / 0.3],
         steer,
         flap: 0.0,
+        friction: None,
     }
 }
 
@@ -347,11 +348,13 @@ fn a_mirrored_manoeuvre_is_a_mirrored_answer() {
         wheel_speed: [99.0, 102.0, 98.0, 104.0],
         steer: 0.05,
         flap: 0.3,
+        friction: None,
     };
     let mirrored = CarInput {
         wheel_speed: [102.0, 99.0, 104.0, 98.0],
         steer: -0.05,
         flap: 0.3,
+        friction: None,
     };
     let rate = model.rate(&state, &input).state.to_array();
     let other = model

@@ -3,7 +3,7 @@
 use lapswarm::Error;
 use lapswarm::study::framework::Progress;
 use lapswarm::study::reproduce::{
-    EvaluatedOn, ReproduceRequest, ReproduceSettings, Summary, begin, reproduce,
+    EvaluatedOn, PAGE, ReproduceRequest, ReproduceSettings, Summary, begin, reproduce,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -21,6 +21,11 @@ fn run(
         memory_limit_mib: 4096,
         stop: Arc::default(),
         observe,
+        draw: &|drawing, folder| {
+            std::fs::create_dir_all(folder).expect("a folder");
+            std::fs::write(folder.join(PAGE), drawing.title.as_bytes()).expect("a page");
+            Ok(())
+        },
     };
     reproduce(settings, folder, request)
 }
@@ -68,6 +73,14 @@ fn a_reproduction_that_is_broken_off_goes_on_with_what_is_left() {
     for name in ["published.csv", "report.html", "summary.json"] {
         assert!(broken.join(name).is_file(), "{name}");
     }
+    // Drawings come last, once, and the page shows the way to theirs.
+    let tyres = broken.join("2_5_tyres").join(PAGE);
+    assert!(tyres.is_file());
+    let page = std::fs::read_to_string(broken.join(PAGE)).expect("the page");
+    assert!(page.contains("2_5_tyres/report.html"));
+    std::fs::write(&tyres, "kept").expect("a page");
+    run(&settings, &broken, &mut |_| ControlFlow::Continue(())).expect("it ends");
+    assert_eq!(std::fs::read_to_string(&tyres).expect("the page"), "kept");
     let other = ReproduceSettings::new(&[3], true, EvaluatedOn::default()).expect("a chapter");
     let refused = run(&other, &broken, &mut |_| ControlFlow::Continue(())).expect_err("another");
     assert_eq!(refused.exit_code(), 2);

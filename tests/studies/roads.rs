@@ -10,8 +10,9 @@ use lapswarm::random::Random;
 use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::hybrid::{HybridStudySettings, set_up as hybrid_set_up};
 use lapswarm::study::raceline::{LineAlgorithm, Raceline, RacelineSettings, Summary, set_up};
-use lapswarm::study::transient::NamedLine;
+use lapswarm::study::transient::{AGREEMENT, NamedLine, Outcome, Prepared, Transient, TransientSettings};
 use lapswarm::swarm::Schedule;
+use lapswarm::vehicle::Car;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
@@ -253,6 +254,90 @@ fn reference_optima_agree_across_cross_sections() {
     });
     let apart = (lap_s[0] - lap_s[1]).abs() / lap_s[1];
     assert!(apart < 1e-3, "{lap_s:?}");
+}
+
+/// A road whose left half is wet for a third of the lap. The fastest line keeps to the right there, within the road; on the wet road it is
+/// faster than the line that is fastest on the dry one, and the car with four wheels drives it as the point mass does.
+#[test]
+fn the_fastest_line_goes_round_a_wet_patch() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let dry = RacelineSettings {
+        car_width_m: 3.0,
+        ..WIDE.settings(folder.path())
+    };
+    let text = std::fs::read_to_string(&dry.track).expect("the survey");
+    let rows = text.lines().count() - 1;
+    let is_wet = |row: usize| (rows / 3..2 * rows / 3).contains(&row);
+    let with_friction = text.lines().enumerate().map(|(i, row)| match i {
+        0 => format!("{row},friction_left,friction_right\n"),
+        _ if is_wet(i - 1) => format!("{row},0.4,1\n"),
+        _ => format!("{row},1,1\n"),
+    });
+    let track = folder.path().join("wet.csv");
+    std::fs::write(&track, with_friction.collect::<String>()).expect("a survey");
+    let wet = RacelineSettings {
+        track: track.display().to_string(),
+        ..dry.clone()
+    };
+    let fastest = |settings: &RacelineSettings| {
+        let setup = set_up(settings).expect("a road");
+        let solvers = setup.solvers(settings, &Arc::default()).expect("solvers");
+        let line = solvers
+            .best(LineObjective::LapTime)
+            .expect("a line")
+            .expect("a solver");
+        let report = setup.report("fastest", &line.alpha, settings).expect("a line");
+        (setup, report)
+    };
+    let ((dry_road, on_dry), (wet_road, on_wet)) = (fastest(&dry), fastest(&wet));
+    assert!(on_wet.clearance.is_on_road() && on_dry.clearance.is_on_road());
+    assert!(wet_road.cross_sections.relief.is_some() && dry_road.cross_sections.relief.is_none());
+    // Friction under each line, at its own points, on the wet road.
+    let under = |points: &[DVec2]| {
+        let surfaces = wet_road.cross_sections.relief_along(points).expect("a surface");
+        let wet: Vec<f64> = surfaces
+            .iter()
+            .map(|s| s[2])
+            .filter(|friction| *friction < 0.995)
+            .collect();
+        wet.iter().sum::<f64>() / wet.len() as f64
+    };
+    let [there, dry_line] = [&on_wet, &on_dry].map(|line| under(&line.fine.points_m));
+    assert!(there > dry_line + 0.05, "{there} {dry_line}");
+    let surfaces = wet_road.cross_sections.relief_along(&on_dry.fine.points_m);
+    let driven = Some((&wet_road.car, [].as_slice()));
+    let same = FineLine::on(&on_dry.fine.points_m, surfaces.as_deref(), true, 1.0, driven, 0.0);
+    let same_s = same.expect("a line").lap_time_s().expect("a lap");
+    let found_s = on_wet.lap_time_fine_s();
+    assert!(found_s < 0.99 * same_s, "{found_s} {same_s}");
+    assert!(on_dry.lap_time_fine_s() < 0.99 * found_s);
+
+    let line = NamedLine::new("fastest".to_owned(), on_wet.fine.points_m.clone(), &wet_road, 2.0);
+    let prepared = Prepared {
+        car: Car::bundled().expect("the bundled car"),
+        lines: vec![line.expect("room")],
+        road: wet_road,
+        motor: None,
+    };
+    let found = solve_unobserved::<Transient>(&TransientSettings::default(), &prepared).expect("it drives");
+    let Outcome::Line(driven) = found else {
+        panic!("one line was to be driven")
+    };
+    assert!(
+        driven.disagreement().abs() <= AGREEMENT,
+        "{}",
+        driven.disagreement()
+    );
+    assert!(
+        driven.margin_m > 0.0 && driven.grip_share > 0.7,
+        "{}",
+        driven.grip_share
+    );
+    let full_s = driven.full_grip_s.expect("a lap at full grip");
+    assert!((full_s / found_s - 1.0).abs() < 2e-3, "{full_s} {found_s}");
+    let wettest = driven.drive.inputs.iter().filter_map(|input| input.friction);
+    let wettest = wettest.fold(1.0, f64::min);
+    assert!((0.4..0.95).contains(&wettest), "{wettest}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{CAR, Kind, TYRE, car, guess, tyres};
 use lapswarm::files::write_together;
 use lapswarm::report::{Curves, HtmlReport, Panel, Table};
+use lapswarm::vehicle::Car;
 use lapswarm::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -59,6 +60,21 @@ impl<'a> Subject<'a> {
             folder.join("report.html").display()
         ))
     }
+}
+
+/// Draws a bundled car into a folder, or its tyres, whose files are then there, too.
+pub fn draw_bundled(name: &str, of_tyres: bool, folder: &Path) -> Result<()> {
+    if !of_tyres {
+        return Subject::Car(name.as_ref()).draw(folder).map(drop);
+    }
+    let car = Car::load(name)?;
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+    car.write(folder, name)?;
+    let names = car.files(name).into_iter().map(|(name, _)| folder.join(name));
+    let tyres: Vec<PathBuf> = names
+        .filter(|path| path.extension().is_some_and(|e| e == "tir"))
+        .collect();
+    Subject::Tyres(&tyres).draw(folder).map(drop)
 }
 
 /// How a line is drawn.

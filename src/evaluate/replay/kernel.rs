@@ -20,6 +20,7 @@ fn input_between<R: Real>(from: &Sample<R::Storage>, to: &Sample<R::Storage>, fr
         wheel_speed: std::array::from_fn(|i| mix(from.wheel_speed[i], to.wheel_speed[i])),
         steer: mix(from.steer, to.steer),
         flap: mix(from.flap, to.flap),
+        friction: None,
     }
 }
 

@@ -46,6 +46,7 @@ impl Sample<f64> {
             wheel_speed: self.wheel_speed,
             steer: self.steer,
             flap: self.flap,
+            friction: None,
         }
     }
 }

@@ -178,6 +178,7 @@ pub fn settle_rate<R: Real, T: Tyre<R>>(
         // The model takes the angle that a sensor reads.
         steer: (steer - c.steer_offset) / c.steer_scale,
         flap: R::lit(0.0),
+        friction: None,
     };
     let rate = car.rate(&state, &input).state;
     let lag = rate.pitch_acceleration * c.pitch_lag;

@@ -192,6 +192,10 @@ pub(in crate::study) fn run<S: Study>(request: Request<'_>) -> Result<Answer> {
     let limit_mib = request.memory_limit_mib;
     limit_memory(limit_mib);
     let (settings, resumed) = begin::<S>(&request)?;
+    // A folder that is taken is refused before any work.
+    if resumed.is_none() {
+        run_folder::would_be(S::NAME, request.out)?;
+    }
     // What no input has room for is refused before any is read.
     drop(memory::check(&S::size(&settings, None), limit_mib)?);
     let prepared = S::prepare_until(&settings, &request.stop)?;

@@ -68,8 +68,8 @@ pub(super) fn notes(setup: &Setup, summary: &Summary) -> Vec<String> {
         .is_some_and(|circuit| circuit.relief.is_some())
     {
         notes.push(
-            "The track has height or banking. Replays are those of a level road: both are left out, and what they do to the car is \
-             taken for the car's own."
+            "The track has height, banking or friction. Replays are those of a level and dry road: what these do to the car is taken \
+             for the car's own."
                 .to_owned(),
         );
     }

@@ -12,13 +12,18 @@ enum About {
 }
 
 /// The parameters. Mass, wheelbase, tracks and weight distribution are measured, and the log's calibration tells the rolling radii.
-const UNSURE: [(&str, About); 17] = [
+const UNSURE: [(&str, About); 21] = [
     ("front.lMUy", About::Times(0.6, 1.6)),
     ("rear.lMUy", About::Times(0.6, 1.6)),
     ("front.lKy", About::Times(0.15, 3.0)),
     ("rear.lKy", About::Times(0.15, 3.0)),
     ("lMUx", About::Times(0.6, 1.6)),
     ("lKx", About::Times(0.15, 3.0)),
+    // How friction and stiffness change with load: base sets differ most there, and downforce brings loads far from those at rest.
+    ("pDx2", About::By(0.3, 0.3)),
+    ("pDy2", About::By(0.3, 0.3)),
+    ("pKx3", About::By(0.5, 0.5)),
+    ("pKy2", About::Times(0.5, 4.0)),
     ("rBx1", About::Times(0.5, 2.0)),
     ("rBy1", About::Times(0.5, 2.0)),
     ("cg_height_m", About::Times(0.6, 1.6)),
@@ -35,7 +40,7 @@ const UNSURE: [(&str, About); 17] = [
 const DOWNFORCE: f64 = 0.5;
 
 /// How many of them there are at the most: a tyre's may differ by axle.
-pub(super) const MOST: usize = UNSURE.len() + 4;
+pub(super) const MOST: usize = UNSURE.len() + 8;
 
 /// The parameters of this car that are usually not known, with bounds about its own values.
 pub(super) fn unsure_of(car: &Car) -> Vec<FreeParameter> {
@@ -76,6 +81,7 @@ pub(super) fn unsure_of(car: &Car) -> Vec<FreeParameter> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vehicle::TyreModel;
 
     #[test]
     fn bounds_are_about_the_values_of_the_car() {
@@ -99,6 +105,12 @@ mod tests {
         let free = unsure_of(&car.with_flat(&flat));
         let named = |name: &str| free.iter().any(|f| f.name == name);
         assert!(named("front.lKx") && named("rear.lKx") && !named("lKx"));
-        assert!(free.len() <= MOST);
+        // Tyres that differ in everything.
+        let mut flat = car.to_flat();
+        for parameter in TyreModel::MagicFormula.parameters() {
+            let rear = car.parameter(&format!("rear.{}", parameter.name)).unwrap();
+            flat[rear.slots[0]] = 1.1 * flat[rear.slots[0]] + 0.01;
+        }
+        assert_eq!(unsure_of(&car.with_flat(&flat)).len(), MOST);
     }
 }

@@ -156,7 +156,7 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
         warnings: bridges(solved.prepared)
             .into_iter()
             .chain(unused_drs(solved.prepared))
-            .chain(three_dimensions(solved.prepared))
+            .chain(surface(solved.prepared))
             .chain(warnings(outcome))
             .collect(),
     }
@@ -170,9 +170,12 @@ fn bridges(setup: &Setup) -> Vec<String> {
         .collect()
 }
 
-/// What is left out of a road in three dimensions.
-fn three_dimensions(setup: &Setup) -> Vec<String> {
-    if setup.road.relief.is_none() {
+/// What is left out of a road that is not level and dry.
+fn surface(setup: &Setup) -> Vec<String> {
+    let Some(relief) = &setup.road.relief else {
+        return Vec::new();
+    };
+    if relief.is_level() {
         return Vec::new();
     }
     let mut words = vec![
@@ -291,7 +294,7 @@ pub(super) fn write_files(folder: &Path, setup: &Setup, outcome: &Outcome) -> Re
 
 /// The line on its fine spline: station, place, alpha, curvature, speed, accelerations, steering, time, the gear that gives most
 /// (from 1) where there is a gearbox, and the share of the grip that is used. Where the DRS is open anywhere, 1 says where. On a road
-/// in three dimensions height, sine of the gradient, banking and load over mass follow.
+/// that is not level and dry height, sine of the gradient, banking, friction and load over mass follow.
 fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
     let fine = &line.fine;
     let (x, y): (Vec<f64>, Vec<f64>) = fine.points_m.iter().map(|p| (p.x, p.y)).unzip();
@@ -326,10 +329,12 @@ fn write_line(path: &Path, setup: &Setup, line: &ReportedLine) -> Result<()> {
         let mut gradient = relief.gradient.clone();
         // An open line ends with the gradient that leads to its end.
         gradient.extend(relief.gradient.last().filter(|_| !fine.closed).copied());
+        let figure = |k: usize| relief.surface.iter().map(|s| s[k]).collect::<Vec<f64>>();
         table = table
-            .numbers("z", "m", &relief.z_m)
+            .numbers("z", "m", figure(0))
             .numbers("gradient", "-", gradient)
-            .numbers("bank", "rad", &relief.bank_rad);
+            .numbers("bank", "rad", figure(1))
+            .numbers("friction", "-", figure(2));
         if let Some(lap) = &fine.lap {
             let load: Vec<f64> = lap.forces_mps2.iter().map(|forces| forces[2]).collect();
             table = table.numbers("load", "m/s^2", load);

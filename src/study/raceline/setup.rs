@@ -8,7 +8,7 @@ use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadEdges, TERMS};
 use crate::optimum::{ReferenceSolvers, mended};
 use crate::study::framework::Plan;
-use crate::track::{CrossSections, Track, racetrack_csv};
+use crate::track::{CrossSections, Surface, Track, racetrack_csv};
 use crate::vehicle::limits::{SpeedRange, car_envelope, car_envelope_under_loads};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
@@ -85,9 +85,10 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
         None => {
-            let limits = match road.relief {
-                Some(_) => car_envelope_under_loads(&car, &SpeedRange::USUAL)?,
-                None => car_envelope(&car, &SpeedRange::USUAL)?,
+            // On a level road the weight is the only load.
+            let limits = match &road.relief {
+                Some(relief) if !relief.is_level() => car_envelope_under_loads(&car, &SpeedRange::USUAL)?,
+                _ => car_envelope(&car, &SpeedRange::USUAL)?,
             };
             (limits.envelope, car.name.clone())
         }
@@ -252,9 +253,9 @@ impl Setup {
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], fine.closed);
         let abreast = edges.abreast(&fine.points_m);
         let given = (0..n).filter(|&i| fine.section[i].1 == 0.0);
-        let relief = fine.relief.as_ref().map(|relief| -> Vec<[f64; 2]> {
+        let relief = fine.relief.as_ref().map(|relief| -> Vec<Surface> {
             let own = (0..n).filter(|&i| fine.section[i].1 == 0.0);
-            own.map(|i| [relief.z_m[i], relief.bank_rad[i]]).collect()
+            own.map(|i| relief.surface[i]).collect()
         });
         let rows = given.map(|i| {
             let (before, after) = if fine.closed {

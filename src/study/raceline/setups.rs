@@ -81,12 +81,12 @@ pub(super) fn solve_setups(
     work: &mut Running<'_>,
 ) -> Result<SetupsOutcome> {
     if setup.road.relief.is_some() {
-        let found = "set-ups on a road with height or banking";
+        let found = "set-ups on a road with height, banking or friction";
         return Err(Error::input(
             "the study",
             "setups",
             found,
-            "a level road (flat = true)",
+            "a level and dry road (flat = true)",
         ));
     }
     let car = Car::load(&settings.car)?;

@@ -36,6 +36,9 @@ pub struct Chapter {
     /// Its tables.
     #[serde(rename = "table")]
     pub items: Vec<Item>,
+    /// Its pictures without figures to compare.
+    #[serde(default, rename = "drawing")]
+    pub drawings: Vec<Drawing>,
     /// What it has that is not reproduced, and why, a sentence each.
     #[serde(default)]
     pub left_out: Vec<String>,
@@ -64,6 +67,23 @@ pub struct Item {
     quick: Quick,
     /// The figures.
     pub figures: Vec<Asked>,
+}
+
+/// Pictures of a car or of its tyres.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drawing {
+    /// The name of its folder, as an [`Item`] has it.
+    pub name: String,
+    /// Its heading.
+    pub title: String,
+    /// What it shows.
+    pub about: String,
+    /// A bundled car.
+    pub car: String,
+    /// Whether its tyres are drawn, in place of the car itself.
+    #[serde(default)]
+    pub tyres: bool,
 }
 
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -225,6 +245,10 @@ mod tests {
         let mut names = std::collections::BTreeSet::new();
         for number in numbers() {
             let chapter = Chapter::load(number).expect("a chapter");
+            for drawing in &chapter.drawings {
+                assert!(names.insert(drawing.name.clone()), "{} twice", drawing.name);
+                crate::vehicle::Car::load(&drawing.car).expect(&drawing.name);
+            }
             for item in &chapter.items {
                 assert!(item.name.starts_with(&format!("{number}_")), "{}", item.name);
                 assert!(!item.figures.is_empty(), "{}", item.name);

@@ -1,12 +1,12 @@
 //! The thesis's tables, chapter by chapter: each is a study or a sweep, whose figures stand beside the published ones.
 //!
-//! Each table has a folder of its own, with the page of its study or sweep. A study may read files of the tables before it. A table that is finished is not done again, so a
-//! reproduction that was interrupted goes on where it stopped.
+//! Each table has a folder of its own, with the page of its study or sweep. A study may read files of the tables before it. A table that
+//! is finished is not done again, so a reproduction that was interrupted goes on where it stopped.
 
 mod chapter;
 mod results;
 
-pub use chapter::{Chapter, EvaluatedOn, Item, Task, numbers};
+pub use chapter::{Chapter, Drawing, EvaluatedOn, Item, Task, numbers};
 pub use results::{Compared, Summary, TableSummary};
 
 use crate::config::kinds::Choice;
@@ -28,6 +28,8 @@ use std::time::{Duration, Instant};
 
 /// What a folder of a reproduction holds from its beginning: what was asked for.
 pub const REPRODUCE_FILE: &str = "reproduce.toml";
+/// The page of a table, a drawing, and the whole.
+pub const PAGE: &str = "report.html";
 /// Times of the tables.
 const TIMES: &str = "times.json";
 
@@ -54,6 +56,8 @@ pub struct ReproduceRequest<'a> {
     pub stop: Arc<AtomicBool>,
     /// Is told of the progress and may end it.
     pub observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    /// Draws pictures into a folder, with a page [`PAGE`].
+    pub draw: &'a dyn Fn(&Drawing, &Path) -> Result<()>,
 }
 
 /// What a table took, over all processes that worked on it, and what failed in the last of them.
@@ -188,6 +192,12 @@ pub fn reproduce(
             }
             Err(Error::Interrupted(_)) => return Err(Error::Interrupted(folder.to_owned())),
             Err(error) => return Err(error),
+        }
+    }
+    for drawing in settings.chapters.iter().flat_map(|chapter| &chapter.drawings) {
+        let folder = folder.join(&drawing.name);
+        if ended_by.is_none() && !folder.join(PAGE).is_file() {
+            (request.draw)(drawing, &folder)?;
         }
     }
     let summary = Summary::new(settings, tables, ended_by);

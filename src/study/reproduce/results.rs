@@ -1,7 +1,7 @@
 //! Published figures beside ours: the summary, the table and the page.
 
-use super::chapter::{Asked, Chapter, Item};
-use super::{ReproduceSettings, Took};
+use super::chapter::{Asked, Chapter, Drawing, Item};
+use super::{PAGE, ReproduceSettings, Took};
 use crate::error::Result;
 use crate::files::run_folder::SUMMARY;
 use crate::report::{BarPanel, Bars, HtmlReport, Table, significant};
@@ -349,6 +349,14 @@ impl Summary {
                 }
                 page.reports_within(std::slice::from_ref(&item.name));
             }
+            let drawn = |drawing: &&Drawing| folder.join(&drawing.name).join(PAGE).is_file();
+            for drawing in chapter.drawings.iter().filter(drawn) {
+                page.section(
+                    &format!("Chapter {}: {}", chapter.number, drawing.title),
+                    &drawing.about,
+                );
+                page.reports_within(std::slice::from_ref(&drawing.name));
+            }
             if !chapter.left_out.is_empty() {
                 page.section(&format!("Chapter {}: what is not here", chapter.number), "");
                 for left_out in &chapter.left_out {
@@ -357,7 +365,7 @@ impl Summary {
             }
         }
         page.settings("reproduce.toml", settings.to_toml());
-        page.write(folder.join("report.html"))
+        page.write(folder.join(PAGE))
     }
 }
 

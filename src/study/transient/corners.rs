@@ -255,7 +255,8 @@ pub(super) fn raise(
         ));
     };
     let driven_s = corners.driven_s(&driven, lap_time_s);
-    let full = FineLine::new(&line.points_m, true, 1.0, Some((limits, &line.drs)), 0.0)?;
+    let road = line.relief.as_deref();
+    let full = FineLine::on(&line.points_m, road, true, 1.0, Some((limits, &line.drs)), 0.0)?;
     let full_s = full.lap.as_ref().map_or_else(
         || vec![f64::NAN; corners.count],
         |lap| corners.times_s(&lap.elapsed_s(), lap.time_s),

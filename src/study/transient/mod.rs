@@ -32,7 +32,7 @@ use crate::line::{FineLine, PointMass, read_line};
 use crate::study::framework::memory::MemoryItem;
 use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
 use crate::study::raceline;
-use crate::track::Circuit;
+use crate::track::{Circuit, Surface};
 use crate::vehicle::{Car, Envelope, Traction};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -50,8 +50,8 @@ pub struct NamedLine {
     pub points_m: Vec<DVec2>,
     /// Whether the DRS may be open from each point to the next; nowhere if empty.
     pub drs: Vec<bool>,
-    /// Height (m) and banking (rad) at each point, on a road in three dimensions.
-    pub relief: Option<Vec<[f64; 2]>>,
+    /// The surface at each point, on a road that is not level and dry.
+    pub relief: Option<Vec<Surface>>,
     /// The line as a circuit of its own, its widths the room that the car's side has to the edges. Its DRS zones are where the
     /// quasi-steady-state lap has the flap open.
     pub circuit: Circuit,

@@ -311,7 +311,10 @@ fn gears(car: &Car, v_mps: &[f64]) -> Option<Vec<f64>> {
 fn grip_used(limits: &PointMass, drive: &Drive, moments: &[Moment]) -> Vec<f64> {
     let places = drive.states.iter().zip(moments).enumerate();
     let used = places.map(|(i, (state, moment))| match drive.loads_mps2.get(i) {
-        Some(load) => limits.grip_used_under(state[0], [moment.ax_mps2, moment.ay_mps2, *load]),
+        Some(load) => {
+            let friction = drive.inputs[i].friction.unwrap_or(1.0);
+            limits.grip_used_under(state[0], [moment.ax_mps2, moment.ay_mps2, *load, friction])
+        }
         None => limits.grip_used(state[0], [moment.ax_mps2, moment.ay_mps2]),
     });
     used.collect()

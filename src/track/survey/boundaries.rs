@@ -116,6 +116,7 @@ pub(super) fn survey(left: &Edge, right: &Edge, path: &Path, options: &SurveyOpt
         bridges: options.bridges,
         z_m: Vec::new(),
         bank_deg: Vec::new(),
+        friction: Vec::new(),
         height_gap_m: 0.0,
     };
     survey.check()?;

@@ -1,6 +1,6 @@
 //! Surveys in columns of numbers.
 
-use super::super::relief::{HEIGHTS_M, STEEPEST_BANK_DEG};
+use super::super::relief::{FRICTION_COLUMNS, FRICTIONS, HEIGHTS_M, STEEPEST_BANK_DEG, friction_columns};
 use super::check::FURTHEST_M;
 use super::geographic::{self, Fix};
 use super::{MOST_POINTS, Raw, WIDEST_M};
@@ -37,9 +37,12 @@ enum Column {
     RightY,
     Height,
     Bank,
+    Friction,
+    LeftFriction,
+    RightFriction,
 }
 
-const NAMES: [(&str, Column); 20] = [
+const NAMES: [(&str, Column); 23] = [
     ("x_m", Column::X),
     ("y_m", Column::Y),
     ("latitude_deg", Column::Latitude),
@@ -60,6 +63,9 @@ const NAMES: [(&str, Column); 20] = [
     ("right_y_m", Column::RightY),
     ("z_m", Column::Height),
     ("bank_deg", Column::Bank),
+    ("friction", Column::Friction),
+    ("friction_left", Column::LeftFriction),
+    ("friction_right", Column::RightFriction),
 ];
 
 /// The name of a column as the header spells it, shortened for messages.
@@ -154,13 +160,19 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
         .both(Column::LeftX, Column::LeftY)
         .zip(table.both(Column::RightX, Column::RightY));
     if let Some((left, right)) = edges {
-        let relief = table.index(Column::Height).or(table.index(Column::Bank));
-        if let Some(at) = relief {
+        let surface = [
+            Column::Height,
+            Column::Bank,
+            Column::Friction,
+            Column::LeftFriction,
+            Column::RightFriction,
+        ];
+        if let Some(at) = surface.iter().find_map(|column| table.index(*column)) {
             return Err(Error::input(
                 path,
                 Place::from("header").named(format!("column {}", at + 1)),
-                "height or banking beside two edges",
-                "a line with x_m,y_m, widths and z_m or bank_deg",
+                "height, banking or friction beside two edges",
+                "a line with x_m,y_m, widths and z_m, bank_deg or friction",
             ));
         }
         return read_edges(&table, rows, left, right);
@@ -237,6 +249,10 @@ fn read_line<'a>(
     let sides = table.both(Column::LeftWidth, Column::RightWidth);
     let whole = table.index(Column::Width);
     let (height, bank) = (table.index(Column::Height), table.index(Column::Bank));
+    let frictions = friction_columns(
+        [Column::Friction, Column::LeftFriction, Column::RightFriction].map(|column| table.index(column)),
+    )
+    .map_err(|found| Error::input(table.path, "header", found, FRICTION_COLUMNS))?;
     let mut raw = Raw::default();
     let mut fixes = Vec::new();
     let (mut left, mut right) = (Vec::new(), Vec::new());
@@ -263,6 +279,10 @@ fn read_line<'a>(
         if let Some(bank) = bank {
             raw.bank_deg
                 .push(cell(bank, -STEEPEST_BANK_DEG, STEEPEST_BANK_DEG)?);
+        }
+        if let Some(edges) = frictions {
+            let at = |edge: usize| cell(edge, FRICTIONS.0, FRICTIONS.1);
+            raw.friction.push([at(edges[0])?, at(edges[1])?]);
         }
         if let Some([l, r]) = sides {
             left.push(cell(l, 0.0, WIDEST_M)?);

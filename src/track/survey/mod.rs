@@ -9,7 +9,8 @@
 //! - GPX (`trk` or `rte`) and KML (`LineString`, `LinearRing` or `gx:Track`);
 //! - a telemetry log with GPS, of which one lap becomes the line.
 //!
-//! Tables of lines may have a height, `z_m`, and a banking, `bank_deg`; GPX and KML have heights where all their points do.
+//! Tables of lines may have a height, `z_m`, a banking, `bank_deg`, and a friction, `friction` or `friction_left` and
+//! `friction_right`, as a share of what the car's tyres have (1 where it is dry); GPX and KML have heights where all their points do.
 //!
 //! Geographic coordinates are projected onto the plane that touches the WGS 84 ellipsoid at the middle of the line.
 
@@ -49,7 +50,7 @@ pub struct SurveyOptions {
     pub lap: Option<u32>,
     /// How many times the line may cross itself, as at the bridge of a figure of eight.
     pub bridges: usize,
-    /// Whether height and banking are left out.
+    /// Whether height, banking and friction are left out.
     pub flat: bool,
 }
 
@@ -82,6 +83,8 @@ pub struct Survey {
     pub z_m: Vec<f64>,
     /// Banking at each point (degrees about the direction of driving, the left side up); empty where it is not known.
     pub bank_deg: Vec<f64>,
+    /// Friction at the left and the right edge beside each point, as a share of the car's own; empty where it is not known.
+    pub friction: Vec<[f64; 2]>,
     /// Gap in height between end and start of a closed line, which is spread over its length already (m).
     pub height_gap_m: f64,
 }
@@ -96,6 +99,8 @@ struct Raw {
     /// Heights (m) and banking (degrees), as many as points, or none.
     z_m: Vec<f64>,
     bank_deg: Vec<f64>,
+    /// Friction at the left and the right edge, likewise.
+    friction: Vec<[f64; 2]>,
     name: Option<String>,
 }
 
@@ -169,6 +174,7 @@ fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey
     if options.flat {
         raw.z_m.clear();
         raw.bank_deg.clear();
+        raw.friction.clear();
     }
     let closed = check::close(&mut raw.points, &raw.lines, path, options.closed)?;
     let n = raw.points.len();
@@ -189,6 +195,7 @@ fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey
     right_m.truncate(n);
     raw.lines.truncate(n);
     raw.bank_deg.truncate(n);
+    raw.friction.truncate(n);
     let mut heights = Given {
         z_m: raw.z_m,
         ..Given::default()
@@ -214,6 +221,7 @@ fn assemble(mut raw: Raw, path: &Path, options: &SurveyOptions) -> Result<Survey
         bridges: options.bridges,
         z_m: heights.z_m,
         bank_deg: raw.bank_deg,
+        friction: raw.friction,
         height_gap_m: heights.gap_m,
     };
     survey.check()?;

@@ -215,6 +215,7 @@ impl Reader<'_> {
                 Vec::new()
             },
             bank_deg: Vec::new(),
+            friction: Vec::new(),
         })
     }
 }

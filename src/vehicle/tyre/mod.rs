@@ -86,6 +86,30 @@ pub trait Tyre<R: Real>: Copy + Send + Sync {
         let [left, right] = inputs;
         [self.forces(left), self.forces(right)]
     }
+
+    /// The same on a road with this share of the tyres' own friction, none where that is theirs. By similarity: forces over the friction
+    /// are those at slips over it, so that stiffness stays and peaks go with the friction (H. B. Pacejka, *Tyre and Vehicle Dynamics*,
+    /// section 4.1).
+    #[inline(always)]
+    fn axle_forces_on(&self, mut inputs: [TyreInput<R>; 2], friction: Option<R>) -> [TyreForces<R>; 2] {
+        // One call: the tyre's code would come twice otherwise, and leave the processor's instruction cache.
+        if let Some(friction) = friction {
+            let inverse = R::lit(1.0) / friction;
+            for input in &mut inputs {
+                input.slip_ratio = input.slip_ratio * inverse;
+                input.slip_tangent = input.slip_tangent * inverse;
+            }
+        }
+        let mut forces = self.axle_forces(inputs);
+        if let Some(friction) = friction {
+            for forces in &mut forces {
+                forces.x = forces.x * friction;
+                forces.y = forces.y * friction;
+                forces.aligning_moment = forces.aligning_moment * friction;
+            }
+        }
+        forces
+    }
 }
 
 /// The tyre models.
@@ -103,6 +127,42 @@ impl TyreModel {
         match self {
             Self::MagicFormula => TyreCoefficients::<f64>::PARAMETERS,
             Self::Linear => LinearTyre::<f64>::PARAMETERS,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle::{Car, CarModel};
+
+    /// On a road of half the friction a tyre's greatest force is half, and its stiffness that of the dry road; for slips along and
+    /// across.
+    #[test]
+    fn friction_lowers_the_peak_and_leaves_the_stiffness() {
+        let flat = Car::bundled().unwrap().to_flat();
+        let tyre = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).tyres[1];
+        let wheel = |along: f64, across: f64| TyreInput {
+            load: 3500.0,
+            slip_ratio: along,
+            slip_tangent: across,
+            side: 1.0,
+        };
+        for [along, across] in [[1.0, 0.0], [0.0, 1.0]] {
+            let force = |slip: f64, friction: Option<f64>| {
+                let both = [wheel(slip * along, slip * across); 2];
+                let forces = tyre.axle_forces_on(both, friction)[0];
+                along * forces.x - across * forces.y
+            };
+            let greatest = |friction: Option<f64>| {
+                let slips = (0..4000).map(|i| 1e-4 * f64::from(i));
+                slips.map(|slip| force(slip, friction)).fold(0.0, f64::max)
+            };
+            let ratio = greatest(Some(0.5)) / greatest(None);
+            assert!((ratio - 0.5).abs() < 1e-4, "{ratio}");
+            let stiffness = |friction: Option<f64>| force(1e-6, friction) - force(-1e-6, friction);
+            let ratio = stiffness(Some(0.5)) / stiffness(None);
+            assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
         }
     }
 }

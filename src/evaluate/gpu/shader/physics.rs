@@ -196,7 +196,7 @@ pub struct DriveShape<'a> {
     pub cells_ahead: usize,
     /// Whether there are plans to blend.
     pub blends: bool,
-    /// Of roads in three dimensions, the first vector of height and banking in the table of paths.
+    /// Of roads that are not level and dry, the first vector of surfaces in the table of paths.
     pub relief_at: Option<usize>,
 }
 

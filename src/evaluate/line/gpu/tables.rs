@@ -63,9 +63,10 @@ impl DeviceSection {
                 i as u32
             };
         }
-        // Height and banking stand behind all of them.
+        // Height, banking and friction stand behind all of them.
         let relief = plan.relief.iter().map(|row| Self {
             weights: [row.step_rise, row.across_rise, row.sin, row.cos],
+            step: [row.friction, row.across_friction],
             ..Self::zeroed()
         });
         sections.extend(relief);
