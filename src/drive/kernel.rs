@@ -74,7 +74,7 @@ pub struct Moment<'a, R> {
     pub view: &'a View<R>,
     /// What the wheels and the steering are told.
     pub input: &'a CarInput<R>,
-    /// The road under it, if that is in three dimensions.
+    /// The road under it, if that is not level and dry.
     pub footing: Option<&'a Footing<R>>,
 }
 

@@ -27,6 +27,7 @@ pub(super) fn load_mps2(c: &Chassis<f64>, speed: f64) -> f64 {
 }
 
 /// Estimates of what the car can do at a speed: lateral and longitudinal grip, drive and drag, all in m/s^2.
+/// A row of the road, see [`row_of`].
 type Row = [f64; RELIEF_WIDTH];
 
 struct TyreEnvelope<'a> {

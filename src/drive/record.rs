@@ -22,7 +22,7 @@ pub struct Drive {
     pub station_m: Vec<f64>,
     /// Distance from the centreline, left positive, m.
     pub offset_m: Vec<f64>,
-    /// Load over mass at each sample (m/s^2) on a road in three dimensions; empty on a level one.
+    /// Load over mass at each sample (m/s^2) on a road that is not level and dry; empty on one that is.
     pub loads_mps2: Vec<f64>,
 }
 

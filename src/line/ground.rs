@@ -1,4 +1,4 @@
-//! The road under a point mass: a bend of a level road, or a place of a road in three dimensions. Twin of the same functions in
+//! The road under a point mass: a bend of a level road, or a place of one that is not level and dry. Twin of the same functions in
 //! `shaders/line.wgsl`.
 //!
 //! The line's own frame on the road is T forward, L left and N up from the surface. With `dT/ds = k_g L + k_n N` the specific forces
@@ -107,7 +107,7 @@ impl<R: Lookup> Ground<R> for R {
     }
 }
 
-/// A place of a road in three dimensions.
+/// A place of a road that is not level and dry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sloped<R> {
     /// Curvature along the surface (1/m), positive in left turns.
@@ -324,7 +324,7 @@ impl<R: Lookup> Grounds<R> for LevelRoad {
     }
 }
 
-/// A road in three dimensions.
+/// A road that is not level and dry.
 #[derive(Clone, Copy, Debug)]
 pub struct SlopedRoad;
 

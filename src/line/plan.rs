@@ -26,7 +26,7 @@ pub struct SectionRow<S> {
     pub drs: bool,
 }
 
-/// Height, banking and friction of one section, in differences of height.
+/// The surface at one section: height in differences, banking and friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReliefRow<S> {
     /// From the right end of this cross-section up to that of the next (m).
@@ -88,7 +88,7 @@ impl LinePlan<f64> {
         }
     }
 
-    /// The plan of the road that is not level and dry that `cross_sections` are, if they are.
+    /// The plan with the surface of `cross_sections`, where that is not level and dry.
     pub fn with_relief(mut self, cross_sections: &CrossSections) -> Self {
         let ends = [&cross_sections.right_m, &cross_sections.left_m];
         let [Some(right), Some(left)] = ends.map(|points| cross_sections.relief_of(points)) else {

@@ -33,8 +33,9 @@ pub struct LapProfile {
 }
 
 impl LapProfile {
-    /// A lap of `time_s` on a line of this plan view (lengths of segments in m, and curvatures in 1/m), with the surface under it if that is
-    /// not level and dry, from its speeds squared (m^2/s^2) at the sections; `drs_open` says of each segment whether the driver has the flap open.
+    /// A lap of `time_s` on a line of this plan view (lengths of segments in m, and curvatures in 1/m), with the surface under it if that
+    /// is not level and dry, from its speeds squared (m^2/s^2) at the sections; `drs_open` says of each segment whether the driver has
+    /// the flap open.
     pub fn of_speeds(
         car: &PointMass,
         (segment_m, curvature_1pm): (&[f64], &[f64]),

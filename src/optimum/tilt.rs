@@ -1,4 +1,4 @@
-//! What a car can do at one place of a road in three dimensions, as the solvers use it.
+//! What a car can do at one place of a road that is not level and dry, as the solvers use it.
 //!
 //! A step's model takes the load's curvature, banking and gradient of each place as they are on the line that it starts from, and the
 //! friction with what it gains across the road; laps by which steps are judged have those of their own line.

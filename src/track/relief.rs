@@ -423,7 +423,7 @@ pub(super) fn mixed(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
 /// What is asked for where the surface is not known.
 pub(super) fn level_road(what: &str) -> String {
     format!(
-        "a level road: {what} would leave height, banking and friction out; a TOML file of the road with `flat = true` does so \
+        "a level and dry road: {what} would leave height, banking and friction out; a TOML file of the road with `flat = true` does so \
          knowingly"
     )
 }
@@ -443,7 +443,7 @@ pub(crate) fn interpolated(knots: &[f64], data: &[f64], closed: bool, at: &[f64]
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Smoothing, Survey, SurveyOptions};
+    use super::super::{Smoothing, Survey, SurveyOptions, Track};
     use std::f64::consts::TAU;
     use std::fmt::Write as _;
     use std::path::Path;
@@ -554,12 +554,45 @@ mod tests {
             let [before, after] = [&road, &again].map(|road| of(road, angle, 0.8));
             assert!((before - after).abs() < 2e-3, "{angle}: {before} {after}");
         }
-        // One column is both edges'; dry is no surface at all.
+        // One column is both edges'; dry is no surface at all. A TOML file may say it of the whole road, and columns say more.
         let whole = survey(&circle(",friction", |_| ",0.6".to_owned(), None)).unwrap();
         assert!(whole.friction.iter().all(|f| *f == [0.6; 2]));
         let dry = survey(&circle(",friction", |_| ",1".to_owned(), None)).unwrap();
         let (dry, _) = dry.smoothed(&Smoothing::default()).unwrap().circuit().unwrap();
         assert!(dry.relief.is_none());
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(
+            folder.path().join("plain.csv"),
+            circle("", |_| String::new(), None),
+        )
+        .unwrap();
+        std::fs::write(
+            folder.path().join("told.csv"),
+            circle(",friction", |_| ",0.6".to_owned(), None),
+        )
+        .unwrap();
+        let friction = |text: &str| {
+            let path = folder.path().join("road.toml");
+            std::fs::write(&path, text).unwrap();
+            let circuit = Track::load(&path.display().to_string())?.circuit()?;
+            Ok::<_, crate::Error>(circuit.relief_facts().map(|facts| facts.friction))
+        };
+        assert_eq!(
+            friction("survey = \"plain.csv\"\nfriction = 0.7").unwrap(),
+            Some([0.7; 2])
+        );
+        assert_eq!(
+            friction("survey = \"told.csv\"\nfriction = 0.7").unwrap(),
+            Some([0.6; 2])
+        );
+        assert_eq!(friction("survey = \"told.csv\"\nflat = true").unwrap(), None);
+        let refused = friction("survey = \"plain.csv\"\nfriction = 7")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            refused.contains("field friction: found 7, expected 0.05 to 1.5"),
+            "{refused}"
+        );
     }
 
     #[test]
