@@ -95,39 +95,40 @@ fn spins(speed_squared: f32, ax: f32) -> bool {
     return !(speed_squared < account.exhaust_from) && 0.0 < ax && !(account.exhaust_to_ax < ax);
 }
 
-// What an open DRS sheds of the drag, and what the tyres take on a section's segment.
-fn shed_and_lost(section: u32, speed_squared: f32, curvature: f32) -> vec2<f32> {
-    if !HAS_TRACTION && !HAS_DRS {
-        return vec2<f32>(0.0, 0.0);
+// The drag with the DRS shut, what an open one sheds of it, and what the tyres take on a section's segment.
+fn resistance(section: u32, speed_squared: f32, ground: Ground, level_drag: f32) -> vec3<f32> {
+    if !HAS_RELIEF && !HAS_TRACTION && !HAS_DRS {
+        return vec3<f32>(level_drag, 0.0, 0.0);
     }
-    let shut = driving_with_drs(false, speed_squared, level(curvature));
+    let shut = driving_with_drs(false, speed_squared, ground);
+    let drag = select(level_drag, shut.z, HAS_RELIEF);
     if !may_open(section) {
-        return vec2<f32>(0.0, shut.w);
+        return vec3<f32>(drag, 0.0, shut.w);
     }
-    let open = driving_with_drs(true, speed_squared, level(curvature));
-    return vec2<f32>(shut.z - open.z, open.w);
+    let open = driving_with_drs(true, speed_squared, ground);
+    return vec3<f32>(drag, shut.z - open.z, open.w);
 }
 
 fn additional(
     section: u32,
     start: f32,
     length: f32,
-    here: f32,
-    there: f32,
+    here: Ground,
+    there: Ground,
     most: f32,
     left: f32,
     space: f32,
     candidate: u32,
 ) -> Step {
     let drs = may_open(section);
-    let first = driving_with_drs(drs, start, level(here));
-    let alone = min(first.x, first.y);
-    let ahead = max(start + length * (alone - first.z), 0.0);
+    let first = driving_with_drs(drs, start, here);
+    let alone = uphill(min(first.x, first.y) - first.z, here);
+    let ahead = max(start + length * alone, 0.0);
     let held = min(max(ahead * account.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
     let row = min(u32(held), ENVELOPE_ROWS - 1u);
     let figures = energy[BOOSTS_AT + 2u * row] + (held - f32(row)) * energy[BOOSTS_AT + 2u * row + 1u];
     let greatest = min(figures.x * gates.motor, figures.y);
-    let may = gates_open(here, start) && gates.ax < alone - first.z;
+    let may = gates_open(abs(here.bend), start) && gates.ax < alone;
     let share = zone_share(section, candidate);
     let inverse = 1.0 / length;
     let reach = left * account.force_per_deployed * inverse / account.rotating;
@@ -140,18 +141,20 @@ fn additional(
     let assist = min(both_wanted - wanted, (reach - own) * account.assist_share);
     let boost = own + assist;
 
-    let turns = spins(start, min(first.x, first.y + boost) - first.z) && LEAST_J < space;
+    let turns = spins(start, uphill(min(first.x, first.y + boost) - first.z, here)) && LEAST_J < space;
     let exhaust = select(0.0, figures.z, turns);
 
     let drive = first.y - exhaust;
     let engine = min(first.x, drive);
     let both = min(first.x, drive + boost);
-    let middle = max(start + length * (both - first.z), 0.0);
-    let later = driving_with_drs(drs, middle, level(0.5 * (here + there)));
+    let gained = uphill(both - first.z, here);
+    let middle = max(start + length * gained, 0.0);
+    let between = half_way(here, there);
+    let later = driving_with_drs(drs, middle, between);
     let later_drive = later.y - exhaust;
     let later_both = min(later.x, later_drive + boost);
     let motor = 0.5 * ((both - engine) + (later_both - min(later.x, later_drive)));
-    let reached = max(start + length * ((both - first.z) + (later_both - later.z)), 0.0);
+    let reached = max(start + length * (gained + uphill(later_both - later.z, between)), 0.0);
     let end = min(reached, most);
     // Where less force is needed than both can give, the motor is reduced first, and of the motors the dearer one.
     let spare = 0.5 * (reached - end) * inverse;
@@ -159,13 +162,14 @@ fn additional(
     return Step(end, motors, min(assist, max(motors - own, 0.0)));
 }
 
-fn engine_only(section: u32, start: f32, length: f32, here: f32, there: f32, most: f32) -> f32 {
+fn engine_only(section: u32, start: f32, length: f32, here: Ground, there: Ground, most: f32) -> f32 {
     let drs = may_open(section);
-    let at_start = driving_with_drs(drs, start, level(here));
-    let first = min(at_start.x, at_start.y) - at_start.z;
+    let at_start = driving_with_drs(drs, start, here);
+    let first = uphill(min(at_start.x, at_start.y) - at_start.z, here);
     let middle = max(start + length * first, 0.0);
-    let later = driving_with_drs(drs, middle, level(0.5 * (here + there)));
-    let second = min(later.x, later.y) - later.z;
+    let between = half_way(here, there);
+    let later = driving_with_drs(drs, middle, between);
+    let second = uphill(min(later.x, later.y) - later.z, between);
     return min(max(start + length * (first + second), 0.0), most);
 }
 
@@ -174,8 +178,8 @@ fn provisional(
     state: ptr<function, EnergyState>,
     section: u32,
     length: f32,
-    here: f32,
-    there: f32,
+    here: Ground,
+    there: Ground,
     most: f32,
     candidate: u32,
 ) {
@@ -194,8 +198,8 @@ fn provisional(
         let row = min(u32(held), ENVELOPE_ROWS - 1u);
         let forces = energy[2u * row] + (held - f32(row)) * energy[2u * row + 1u];
         let inverse = 1.0 / length;
-        let lost = shed_and_lost(section, mean, 0.5 * (here + there)).y;
-        let force = account.rotating * (0.5 * (step.end - start) * inverse) + forces.w + lost;
+        let taken = resistance(section, mean, half_way(here, there), forces.w);
+        let force = account.rotating * (0.5 * (step.end - start) * inverse) + taken.x + taken.z + here.climb;
         let unharvested = min(account.harvest_most - (*state).harvested_k, space);
         let room = max(unharvested * account.force_per_harvested * inverse, 0.0);
         let generator = min(min(max(-force, 0.0), forces.z * gates.motor), room);
@@ -221,8 +225,8 @@ fn segment_energy(
     state: ptr<function, EnergyState>,
     section: u32,
     length: f32,
-    here: f32,
-    there: f32,
+    here: Ground,
+    there: Ground,
     most: f32,
     candidate: u32,
 ) -> SegmentEnergy {
@@ -244,9 +248,9 @@ fn segment_energy(
     let inverse = 1.0 / length;
     let ax = 0.5 * (end - start) * inverse;
     // The force at the wheels, driving or braking.
-    let taken = shed_and_lost(section, mean, 0.5 * (here + there));
-    let shut = account.rotating * ax + forces.w + taken.y;
-    let open = shut - taken.x;
+    let taken = resistance(section, mean, half_way(here, there), forces.w);
+    let shut = account.rotating * ax + taken.x + taken.z + here.climb;
+    let open = shut - taken.y;
     // A driver shuts the flap on the brakes.
     let force = max(open, 0.0) + min(shut, 0.0);
     let demand = max(force, 0.0);
@@ -259,7 +263,7 @@ fn segment_energy(
         let unneeded = account.rotating * step.motor - motor;
         assist = max(account.rotating * step.assist - unneeded, 0.0);
     } else {
-        let may = gates_open(here, start) && gates.ax < ax;
+        let may = gates_open(abs(here.bend), start) && gates.ax < ax;
         let share = zone_share(section, candidate);
         let reach = left * account.force_per_deployed * inverse;
         motor = min(min(select(0.0, forces.y * gates.motor * share, may), demand), reach);
@@ -295,22 +299,22 @@ fn segment_energy(
 fn ceilings(candidate: u32) {
     let n = stretch.sections;
     var next = select(n - 1u, stretch.start, CLOSED);
-    var curvature = course[place_of(next, candidate)].y;
-    var speed_squared = corner(level(curvature));
+    var spot = spot_at(next, candidate);
+    var speed_squared = corner(spot.ground);
     speeds_squared[place_of(next, candidate)] = speed_squared;
     // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
     // own values.
     let steps = select(n - 1u, 2u * n, CLOSED);
     for (var i = 0u; i < steps; i++) {
         let before = select(n - 1u, next - 1u, next > 0u);
-        let there = course[place_of(before, candidate)];
-        let reached = braked(speed_squared, there.x, level(curvature), level(there.y));
+        let there = spot_at(before, candidate);
+        let reached = braked(speed_squared, there.length, end_of(there, spot.ground), there.ground);
         let again = i + 1u >= n;
         var most: f32;
         if again {
             most = speeds_squared[place_of(before, candidate)];
         } else {
-            most = corner(level(there.y));
+            most = corner(there.ground);
         }
         let slower = reached < most;
         if again && !slower {
@@ -318,7 +322,7 @@ fn ceilings(candidate: u32) {
         }
         speed_squared = select(most, reached, slower);
         speeds_squared[place_of(before, candidate)] = speed_squared;
-        curvature = there.y;
+        spot = there;
         next = before;
     }
     if !CLOSED {
@@ -342,29 +346,33 @@ fn energy_lap(candidate: u32) {
     if CLOSED {
         // From a slow section late in the lap to the start line, with the store taken as full enough.
         var from_late = speeds_squared[place_of(account.run_in, candidate)];
-        var bend = course[place_of(account.run_in, candidate)];
+        var spot = spot_at(account.run_in, candidate);
         for (var here = account.run_in; here < n; here++) {
             let after = select(0u, here + 1u, here + 1u < n);
-            let there = course[place_of(after, candidate)];
+            let there = spot_at(after, candidate);
+            let end = end_of(spot, there.ground);
             let most = speeds_squared[place_of(after, candidate)];
             if ADDITIONAL {
                 let space = account.store_room + gates.budget;
-                from_late = additional(here, from_late, bend.x, bend.y, there.y, most, gates.budget, space, candidate).end;
+                from_late = additional(
+                    here, from_late, spot.length, spot.ground, end, most, gates.budget, space, candidate
+                ).end;
             } else {
-                from_late = engine_only(here, from_late, bend.x, bend.y, there.y, most);
+                from_late = engine_only(here, from_late, spot.length, spot.ground, end, most);
             }
-            bend = there;
+            spot = there;
         }
         speed_squared = from_late;
         if ADDITIONAL {
             var state = EnergyState(speed_squared, 0.0, 0.0, 0.0);
-            var bend = course[place_of(0u, candidate)];
+            var spot = spot_at(0u, candidate);
             for (var here = 0u; here < n; here++) {
                 let after = select(0u, here + 1u, here + 1u < n);
-                let there = course[place_of(after, candidate)];
+                let there = spot_at(after, candidate);
                 let most = speeds_squared[place_of(after, candidate)];
-                provisional(&state, here, bend.x, bend.y, there.y, most, candidate);
-                bend = there;
+                let end = end_of(spot, there.ground);
+                provisional(&state, here, spot.length, spot.ground, end, most, candidate);
+                spot = there;
             }
             speed_squared = state.speed_squared;
         }
@@ -380,13 +388,14 @@ fn energy_lap(candidate: u32) {
     var block = SegmentEnergy(0.0, 0.0, 0.0, 0.0, 0.0);
     var block_motor = 0.0;
     let segments = select(n - 1u, n, CLOSED);
-    var bend = course[place_of(0u, candidate)];
+    var spot = spot_at(0u, candidate);
     for (var here = 0u; here < segments; here++) {
         let after = select(0u, here + 1u, here + 1u < n);
-        let there = course[place_of(after, candidate)];
+        let there = spot_at(after, candidate);
         let most = speeds_squared[place_of(after, candidate)];
-        let segment = segment_energy(&state, here, bend.x, bend.y, there.y, most, candidate);
-        bend = there;
+        let end = end_of(spot, there.ground);
+        let segment = segment_energy(&state, here, spot.length, spot.ground, end, most, candidate);
+        spot = there;
         block.time = block.time + segment.time;
         block.fuel = block.fuel + segment.fuel;
         block.deployed = block.deployed + segment.deployed;
@@ -423,5 +432,8 @@ fn energy_line(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     _ = shape(candidate);
+    if HAS_RELIEF {
+        relieve(candidate);
+    }
     energy_lap(candidate);
 }

@@ -27,14 +27,15 @@ struct LineStretch {
     rows_per_speed_squared: f32,
     rows_per_radius: f32,
     // Of roads in three dimensions: load over mass of the first table, tables per load, the least and the greatest load in tables,
-    // the radius on the steering lock, and gravity.
+    // the radius on the steering lock, gravity, and the share of the mass that is accelerated which rotates.
     load_first: f32,
     tables_per_load: f32,
     load_least: f32,
     load_most: f32,
     lock_radius: f32,
     gravity: f32,
-    spare: vec2<u32>,
+    coasting: f32,
+    spare: u32,
 }
 
 struct Section {
@@ -178,17 +179,11 @@ fn shape(candidate: u32) -> vec4<f32> {
     return total;
 }
 
-// Where a line crosses a cross-section, from its right end: east, north and up.
-fn crossing(section: u32, candidate: u32) -> vec3<f32> {
+// Where a line crosses a cross-section, from its right end: east, north and up; and the friction there.
+fn crossing(section: u32, candidate: u32) -> vec4<f32> {
     let share = alpha(section, variables_of(section, candidate));
-    let relief = sections[stretch.sections + section].weights;
-    return vec3<f32>(share * sections[section].across, share * relief.y);
-}
-
-// Friction where a line crosses a cross-section.
-fn friction_at(section: u32, candidate: u32) -> f32 {
-    let friction = sections[stretch.sections + section].step;
-    return friction.x + alpha(section, variables_of(section, candidate)) * friction.y;
+    let relief = sections[stretch.sections + section];
+    return vec4<f32>(share * sections[section].across, share * relief.weights.y, relief.step.x + share * relief.step.y);
 }
 
 // A segment's direction in space and its length.
@@ -197,7 +192,7 @@ struct Rising {
     length: f32,
 }
 
-fn rising_between(section: u32, here: vec3<f32>, next: vec3<f32>) -> Rising {
+fn rising_between(section: u32, here: vec4<f32>, next: vec4<f32>) -> Rising {
     let step = sections[section].step + (next.xy - here.xy);
     let rise = sections[stretch.sections + section].weights.x + (next.z - here.z);
     let length = sqrt(max(step.x * step.x + step.y * step.y + rise * rise, 1e-8));
@@ -250,23 +245,24 @@ fn relieve(candidate: u32) {
         course[place_of(i, candidate)] = vec2<f32>(rising.length, found.x);
         course[relief_at(1u, i, candidate)] = vec2<f32>(found.y, climb);
         course[relief_at(2u, i, candidate)] = found.zw;
-        course[relief_at(3u, i, candidate)].x = friction_at(i, candidate);
+        course[relief_at(3u, i, candidate)].x = here.w;
         before = rising;
         here = next;
     }
     if !CLOSED {
-        copy_relief(0u, 1u, 0u, candidate);
-        copy_relief(n - 1u, n - 2u, n - 2u, candidate);
+        // The last that was crossed is the end of the line.
+        copy_relief(0u, 1u, 0u, first.w, candidate);
+        copy_relief(n - 1u, n - 2u, n - 2u, here.w, candidate);
     }
 }
 
-// Gives an end of an open line its neighbour's figures, and the climb of a segment.
-fn copy_relief(end: u32, inner: u32, segment: u32, candidate: u32) {
+// Gives an end of an open line its neighbour's figures, the climb of a segment, and its own friction.
+fn copy_relief(end: u32, inner: u32, segment: u32, friction: f32, candidate: u32) {
     course[place_of(end, candidate)].y = course[place_of(inner, candidate)].y;
     let climb = course[relief_at(1u, segment, candidate)].y;
     course[relief_at(1u, end, candidate)] = vec2<f32>(course[relief_at(1u, inner, candidate)].x, climb);
     course[relief_at(2u, end, candidate)] = course[relief_at(2u, inner, candidate)];
-    course[relief_at(3u, end, candidate)].x = friction_at(end, candidate);
+    course[relief_at(3u, end, candidate)].x = friction;
 }
 
 // The planes of a road that is not level and dry behind the first.
@@ -411,7 +407,8 @@ fn limits_at(speed_squared: f32, ground: Ground, table: u32) -> vec4<f32> {
         let under = loaded_row(layer_of(ground, speed_squared), row, table);
         let limits = under.figures + (held - f32(row)) * under.rises;
         let of_tyres = max(ground.friction * limits.xy, vec2<f32>(LEAST_GRIP));
-        return vec4<f32>(of_tyres, limits.z, limits.w);
+        // The engine climbs with the car alone: what rotates need not be lifted.
+        return vec4<f32>(of_tyres, limits.z + stretch.coasting * ground.climb, limits.w);
     }
     return envelope[table + 2u * row] + (held - f32(row)) * envelope[table + 2u * row + 1u];
 }
@@ -487,13 +484,17 @@ fn driving_with_drs(drs: bool, speed_squared: f32, ground: Ground) -> vec4<f32> 
     return select(shut, open, pays);
 }
 
-fn acceleration(drs: bool, speed_squared: f32, ground: Ground) -> f32 {
-    let at = driving_with_drs(drs, speed_squared, ground);
-    let forces = min(at.x, at.y) - at.z;
+// An acceleration by forces, less the part of gravity that the car climbs against.
+fn uphill(forces: f32, ground: Ground) -> f32 {
     if HAS_RELIEF {
         return forces - ground.climb;
     }
     return forces;
+}
+
+fn acceleration(drs: bool, speed_squared: f32, ground: Ground) -> f32 {
+    let at = driving_with_drs(drs, speed_squared, ground);
+    return uphill(min(at.x, at.y) - at.z, ground);
 }
 
 fn deceleration(speed_squared: f32, ground: Ground) -> f32 {

@@ -128,7 +128,7 @@ impl DriverTable<f64> {
             pedal_lag: PEDAL_LAG_S,
             reach: PLAN_REACH_M,
             rolling: car.rolling_mps2(),
-            rotating: car.powertrain.as_ref().map_or(1.0, |p| p.rotating_mass_factor),
+            rotating: car.rotating_mass_factor(),
             speed_ahead: settings.speed_ahead_s,
             plan_ahead: settings.plan_ahead_s,
         }

@@ -21,6 +21,12 @@ const LEAST_GRIP: f64 = 0.05;
 
 /// A place of the road as the laws of motion need it. A number is the curvature of a level road.
 pub trait Ground<R: Lookup>: Copy {
+    /// Whether the road is level.
+    const LEVEL: bool;
+    /// Curvature (1/m) without a sign: what a driver steers for.
+    fn bend(self) -> R;
+    /// The part of gravity that the car climbs against (m/s^2).
+    fn climb(self) -> R;
     /// Half-way to another place on the same segment.
     fn half_way(self, there: Self) -> Self;
     /// Limits at a speed squared: lateral, grip, drive and drag (m/s^2), and the root of what the lateral share leaves.
@@ -62,6 +68,18 @@ fn traction_in<R: Real>(figures: [R; TRACTION_WIDTH], [along, across]: [R; 2]) -
 }
 
 impl<R: Lookup> Ground<R> for R {
+    const LEVEL: bool = true;
+
+    #[inline(always)]
+    fn bend(self) -> R {
+        self
+    }
+
+    #[inline(always)]
+    fn climb(self) -> R {
+        R::lit(0.0)
+    }
+
     #[inline(always)]
     fn half_way(self, there: Self) -> Self {
         R::lit(0.5) * (self + there)
@@ -221,6 +239,18 @@ impl<R: Lookup> Sloped<R> {
 }
 
 impl<R: Lookup> Ground<R> for Sloped<R> {
+    const LEVEL: bool = false;
+
+    #[inline(always)]
+    fn bend(self) -> R {
+        self.bend.abs()
+    }
+
+    #[inline(always)]
+    fn climb(self) -> R {
+        self.climb
+    }
+
     #[inline(always)]
     fn half_way(self, there: Self) -> Self {
         let half = R::lit(0.5);
@@ -244,7 +274,8 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
         let limits = [
             lateral,
             (self.friction * Self::figure(envelope, layer, row, 1)).max(least),
-            Self::figure(envelope, layer, row, 2),
+            // The engine climbs with the car alone: what rotates need not be lifted.
+            Self::figure(envelope, layer, row, 2) + R::load(envelope.loads.coasting) * self.climb,
             Self::figure(envelope, layer, row, 3),
         ];
         let share = self.across(speed_squared) / lateral;
@@ -392,29 +423,23 @@ impl<R: Real> Rising<R> {
     }
 }
 
-/// Where a line crosses cross-section `i`, from its right end (m): east, north and up.
+/// Where a line crosses cross-section `i`, from its right end (m): east, north and up; and the friction there, as a share of the car's
+/// own.
 #[inline(always)]
-fn crossing<R: Real>(plan: &LinePlan<R::Storage>, i: usize, variables: &[R]) -> [R; 3] {
-    let row = &plan.rows[i];
+fn crossing<R: Real>(plan: &LinePlan<R::Storage>, i: usize, variables: &[R]) -> [R; 4] {
+    let (row, relief) = (&plan.rows[i], &plan.relief[i]);
     let share = alpha(row, plan.terms, variables);
     [
         share * R::load(row.across[0]),
         share * R::load(row.across[1]),
-        share * R::load(plan.relief[i].across_rise),
+        share * R::load(relief.across_rise),
+        R::load(relief.friction) + share * R::load(relief.across_friction),
     ]
-}
-
-/// Friction where a line crosses cross-section `i`, as a share of the car's own.
-#[inline(always)]
-fn friction<R: Real>(plan: &LinePlan<R::Storage>, i: usize, variables: &[R]) -> R {
-    let share = alpha(&plan.rows[i], plan.terms, variables);
-    let relief = &plan.relief[i];
-    R::load(relief.friction) + share * R::load(relief.across_friction)
 }
 
 /// The segment from cross-section `i` to the next.
 #[inline(always)]
-fn segment<R: Real>(plan: &LinePlan<R::Storage>, i: usize, here: [R; 3], next: [R; 3]) -> Rising<R> {
+fn segment<R: Real>(plan: &LinePlan<R::Storage>, i: usize, here: [R; 4], next: [R; 4]) -> Rising<R> {
     let step = plan.rows[i].step;
     Rising::of(
         [
@@ -447,7 +472,7 @@ pub(super) fn relieve<R: Real>(plan: &LinePlan<R::Storage>, variables: &[R], cou
         let rising = segment(plan, i, here, next);
         course.length[i] = rising.length;
         let climb = R::lit(GRAVITY_MPS2) * rising.direction[2];
-        let mut place = [zero, climb, zero, zero, friction(plan, i, variables)];
+        let mut place = [zero, climb, zero, zero, here[3]];
         if let Some(before) = before {
             let ReliefRow { sin, cos, .. } = plan.relief[i];
             let [bend, dip, lean, press] = rising.turned(&before, [R::load(sin), R::load(cos)]);
@@ -459,12 +484,13 @@ pub(super) fn relieve<R: Real>(plan: &LinePlan<R::Storage>, variables: &[R], cou
         here = next;
     }
     if !plan.closed && n > 2 {
-        for (end, inner) in [(0, 1), (n - 1, n - 2)] {
+        // The last that was crossed is the end of the line.
+        for (end, inner, friction) in [(0, 1, first[3]), (n - 1, n - 2, here[3])] {
             let climb = course.relief[end.min(n - 2)][1];
             course.curvature[end] = course.curvature[inner];
             course.relief[end] = course.relief[inner];
             course.relief[end][1] = climb;
-            course.relief[end][4] = friction(plan, end, variables);
+            course.relief[end][4] = friction;
         }
     }
 }

@@ -25,6 +25,8 @@ pub struct LoadTables<S> {
     pub most: S,
     /// Radius on the steering lock (m); tiny where steering is not limited.
     pub lock_radius: S,
+    /// The share of the mass that is accelerated which rotates.
+    pub coasting: S,
     /// Table after table, rows like [`EnvelopeTable::rows`].
     pub rows: Vec<S>,
     /// Table after table, cells like [`EnvelopeTable::traction`].
@@ -42,6 +44,7 @@ impl LoadTables<f64> {
             least: R::store(self.least),
             most: R::store(self.most),
             lock_radius: R::store(self.lock_radius),
+            coasting: R::store(self.coasting),
             rows: all(&self.rows),
             traction: all(&self.traction),
         }
@@ -125,6 +128,7 @@ impl PointMass {
             least: -first / step,
             most: (MOST_LOAD - first) / step,
             lock_radius,
+            coasting: 1.0 - 1.0 / self.rotating_mass_factor,
             rows,
             traction,
         })

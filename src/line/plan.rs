@@ -1,7 +1,7 @@
 //! The tables of a line's cross-sections that kernels read.
 
 use crate::scalar::Real;
-use crate::track::CrossSections;
+use crate::track::{CrossSections, Surface};
 use glam::DVec2;
 
 /// Terms of the sum that gives `alpha` at a section.
@@ -129,6 +129,21 @@ impl LinePlan<f64> {
     /// The plan of one fixed line.
     pub fn of_points(points_m: &[DVec2], closed: bool) -> Self {
         Self::of_cross_sections(points_m, points_m, closed)
+    }
+
+    /// The plan with the surface at each point of one fixed line; none on a level and dry road.
+    pub fn with_surface(mut self, surface: &[Surface]) -> Self {
+        let n = surface.len();
+        let row = |(i, [z, bank, friction, _]): (usize, &Surface)| ReliefRow {
+            step_rise: surface[(i + 1) % n][0] - z,
+            across_rise: 0.0,
+            sin: bank.sin(),
+            cos: bank.cos(),
+            friction: *friction,
+            across_friction: 0.0,
+        };
+        self.relief = surface.iter().enumerate().map(row).collect();
+        self
     }
 
     /// The plan in the precision that the scalar `R` stores tables in.

@@ -20,6 +20,8 @@ pub struct PointMass {
     /// A bend tighter than the lock allows cannot be driven. The line does not fail: the corner speed squared falls with the
     /// fourth power of the radius, so that a search is led back to lines that can be driven.
     pub max_steer_rad: Option<f64>,
+    /// Mass that the engine accelerates over that of the car; what rotates is not lifted on a climb.
+    pub rotating_mass_factor: f64,
     /// Whether its tables have limits under loads, for laps on roads in three dimensions.
     pub relief: bool,
 }
@@ -78,6 +80,7 @@ impl PointMass {
             ellipse_exponent: 2.0,
             wheelbase_m,
             max_steer_rad: None,
+            rotating_mass_factor: 1.0,
             relief: false,
         }
     }
@@ -98,6 +101,7 @@ impl PointMass {
         };
         within("ellipse_exponent", self.ellipse_exponent, 1.0, 4.0)?;
         within("wheelbase_m", self.wheelbase_m, 0.1, 20.0)?;
+        within("rotating_mass_factor", self.rotating_mass_factor, 1.0, 3.0)?;
         self.max_steer_rad
             .map_or(Ok(()), |x| within("max_steer_rad", x, 0.01, 1.5))
     }

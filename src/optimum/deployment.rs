@@ -12,7 +12,9 @@ use crate::error::{Error, Result};
 use crate::evaluate::energy::{HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::kernel::motors_step;
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
+use crate::line::ground::{Grounds, LevelRoad, SlopedRoad};
 use crate::line::kernel::{Course, may_open};
+use crate::track::Surface;
 use glam::DVec2;
 use std::time::Instant;
 
@@ -44,6 +46,8 @@ pub struct DeploymentSearch<'a> {
     pub closed: bool,
     /// Whether the DRS may be open from each point to the next; nowhere if empty.
     pub drs: &'a [bool],
+    /// The surface at each point; empty on a level and dry road.
+    pub surface: &'a [Surface],
     /// A slow section late in the lap.
     pub run_in: usize,
     /// Greatest speed at the start of an open line (m/s).
@@ -111,6 +115,7 @@ impl DeploymentSearch<'_> {
                 points_m: self.points_m.to_vec(),
                 closed: self.closed,
                 drs: self.drs.to_vec(),
+                surface: self.surface.to_vec(),
             },
             self.car.clone(),
             EnergyPlan::single(n, self.run_in, Mode::Additional),
@@ -214,14 +219,23 @@ impl DeploymentSearch<'_> {
     /// The speed squared at the end of segment `i`, the part of the acceleration there (m/s^2) by the motors, and the MGU-H's part of
     /// it.
     fn step(&self, course: &Course<f64>, i: usize, square: f64, share: f64) -> [f64; 3] {
-        let (curvature, n) = (&course.curvature, course.curvature.len());
-        let bends = ([curvature[i], curvature[(i + 1) % n]], may_open(self.drs, i));
+        if course.relief.is_empty() {
+            self.step_on::<LevelRoad>(course, i, square, share)
+        } else {
+            self.step_on::<SlopedRoad>(course, i, square, share)
+        }
+    }
+
+    /// [`Self::step`] on one kind of road.
+    fn step_on<G: Grounds<f64>>(&self, course: &Course<f64>, i: usize, square: f64, share: f64) -> [f64; 3] {
+        let next = (i + 1) % course.curvature.len();
+        let bends = [i, next].map(|section| G::at(course, section, i));
         motors_step(
             &self.car.envelope_table,
             &self.car.table,
             square,
             course.length[i],
-            bends,
+            (bends, may_open(self.drs, i)),
             share,
         )
     }

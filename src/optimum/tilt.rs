@@ -1,7 +1,8 @@
 //! What a car can do at one place of a road that is not level and dry, as the solvers use it.
 //!
 //! A step's model takes the load's curvature, banking and gradient of each place as they are on the line that it starts from, and the
-//! friction with what it gains across the road; laps by which steps are judged have those of their own line.
+//! friction with what it gains across the road; laps by which steps are judged have those of their own line. What rotates counts as
+//! lifted with the car on a climb, which moves a lap by less than a ten-thousandth.
 
 use super::geometry::Shape;
 use super::lap::{BendGrip, Grip, GripEnvelope, Slope};

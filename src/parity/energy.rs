@@ -1,7 +1,7 @@
 //! Layer five: laps with a hybrid's energy on a fixed line, their time, fuel and accounts.
 
 use super::cases::{Cases, Compared, layer_of};
-use super::lines::with_drs;
+use super::lines::{in_relief, with_drs};
 use super::{Draws, Layer};
 use crate::config::kinds::Choice;
 use crate::error::{Error, Result};
@@ -100,37 +100,39 @@ impl Compared for HybridProblem {
 pub(super) fn layer() -> Result<Layer> {
     let modes = [Mode::Offset, Mode::Additional];
     let mut draws = Draws::new(5);
-    let cases = problems(SECTIONS, &modes, true)?
-        .into_iter()
-        .zip(modes)
-        .map(|(problem, mode)| {
-            let zones = problem.dimensions() - GATES.len();
-            let strategies = (0..COUNT).map(|_| {
-                let mut strategy = RANGES.map(|(low, high)| draws.within(low, high)).to_vec();
-                strategy.extend((0..zones).map(|_| draws.within(0.0, 1.0)));
-                strategy
-            });
-            let strategies = strategies.collect();
-            let figures = ["time", "fuel", "deployed", "harvested"];
-            let names = figures.map(|what| format!("energy, {}, {what}", mode.name()));
-            let cases = Cases::new(names.to_vec(), problem, strategies, &[]);
-            if cases.all_succeed() {
-                Ok(cases)
-            } else {
-                Err(Error::Study(
-                    "a lap with energy is not driven to its end".to_owned(),
-                ))
-            }
+    let mut all = Vec::new();
+    for (road, hills) in [("energy", false), ("energy in hills", true)] {
+        let problems = problems(SECTIONS, &modes, true, hills)?;
+        all.extend(problems.into_iter().zip(modes).map(|of| (road, of)));
+    }
+    let cases = all.into_iter().map(|(road, (problem, mode))| {
+        let zones = problem.dimensions() - GATES.len();
+        let strategies = (0..COUNT).map(|_| {
+            let mut strategy = RANGES.map(|(low, high)| draws.within(low, high)).to_vec();
+            strategy.extend((0..zones).map(|_| draws.within(0.0, 1.0)));
+            strategy
         });
+        let strategies = strategies.collect();
+        let figures = ["time", "fuel", "deployed", "harvested"];
+        let names = figures.map(|what| format!("{road}, {}, {what}", mode.name()));
+        let cases = Cases::new(names.to_vec(), problem, strategies, &[]);
+        if cases.all_succeed() {
+            Ok(cases)
+        } else {
+            Err(Error::Study(
+                "a lap with energy is not driven to its end".to_owned(),
+            ))
+        }
+    });
     Ok(layer_of(cases.collect::<Result<_>>()?))
 }
 
 /// Problems of deploying the bundled hybrid's energy on the bundled circuit's reference line, cut into so many cross-sections, a
-/// problem of each mode. All gates and four zones are free. The car has a DRS if `drs` is set.
+/// problem of each mode. All gates and four zones are free. The car has a DRS if `drs` is set, and `hills` makes up the road's surface.
 ///
 /// # Errors
 /// Those of reading the bundled circuit and car.
-pub fn problems(sections: usize, modes: &[Mode], drs: bool) -> Result<Vec<HybridProblem>> {
+pub fn problems(sections: usize, modes: &[Mode], drs: bool, hills: bool) -> Result<Vec<HybridProblem>> {
     let setup = set_up(&RacelineSettings {
         sections: Some(sections),
         ..RacelineSettings::default()
@@ -149,7 +151,13 @@ pub fn problems(sections: usize, modes: &[Mode], drs: bool) -> Result<Vec<Hybrid
     } else {
         (limits.envelope, Vec::new())
     };
-    let car = EnergyCar::new(car, envelope, traction, 2.0)?;
+    let mut car = EnergyCar::new(car, envelope, traction.clone(), 2.0)?;
+    let mut surface = Vec::new();
+    if hills {
+        let (road, point_mass) = in_relief(&setup.cross_sections, &car.point_mass)?;
+        surface = road.relief_of(&points_m).unwrap_or_default();
+        car = EnergyCar::of(car.car, point_mass, traction)?;
+    }
     let zones = [2, 8, 15, 21].map(|part| part * sections / 24);
     let problems = modes.iter().map(|mode| {
         let plan = EnergyPlan::zoned(&length_m, &zones, true, sections / 2, *mode);
@@ -162,6 +170,7 @@ pub fn problems(sections: usize, modes: &[Mode], drs: bool) -> Result<Vec<Hybrid
             points_m: points_m.clone(),
             closed: true,
             drs: drs.clone(),
+            surface: surface.clone(),
         };
         HybridProblem::new(line, car.clone(), plan, strategy, &HybridObjective::ALL, 30.0)
     });

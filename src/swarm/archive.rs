@@ -1,7 +1,7 @@
 //! The archive of solutions that nothing found so far dominates.
 
 use super::Front;
-use super::metrics::{Columns, dominates, non_dominated};
+use super::metrics::{COLUMNS, Columns, dominates, exclusive_of, non_dominated, touches_of};
 use super::settings::{MopsoSettings, Truncation, setting};
 use super::space::Space;
 use crate::error::Result;
@@ -20,7 +20,7 @@ pub struct Archive {
     pub objectives: Vec<Vec<f64>>,
     /// What each member alone dominates and the far corner of the box that this lies in; kept only for
     /// truncation by it.
-    shares: Vec<(f64, [f64; 3])>,
+    shares: Vec<(f64, [f64; COLUMNS])>,
     /// The objectives once more, for the shares.
     columns: Columns,
     /// The reference point of the shares.
@@ -48,6 +48,13 @@ impl MopsoSettings {
     }
 }
 
+/// Most objectives of which an archive knows contributions up to a reference that is given,
+pub(super) const MOST_MEASURED: usize = 5;
+/// and up to one that moves with the members, which costs more,
+const MOST_MOVING: usize = 4;
+/// with four objectives in archives of no more members than these.
+const FEW: usize = 200;
+
 /// The reference point lies this share of the archive's range beyond its worst values, so that extremes count.
 const BEYOND: f64 = 0.1;
 
@@ -67,7 +74,7 @@ impl Archive {
         }
     }
 
-    /// The same with contributions measured up to `reference`, for one to three objectives. The hypervolume up to the reference
+    /// The same with contributions measured up to `reference`, for one to five objectives. The hypervolume up to the reference
     /// then never falls while solutions are feasible: a member that leaves contributes no more than the newcomer. The ends of the
     /// front have no privilege, and solutions that are no better than the reference leave first. Without a fixed reference, the
     /// reference moves with the members and the ends stay.
@@ -130,7 +137,7 @@ impl Archive {
         self.objectives.push(objectives.to_vec());
         self.positions.push(position.to_vec());
         if self.by_contribution() {
-            self.shares.push((0.0, [f64::INFINITY; 3]));
+            self.shares.push((0.0, [f64::INFINITY; COLUMNS]));
             self.columns.push(objectives);
             self.refresh(objectives, true);
         }
@@ -173,7 +180,7 @@ impl Archive {
         self.shares.clear();
         self.columns.clear();
         if self.by_contribution() {
-            self.shares = vec![(0.0, [f64::INFINITY; 3]); self.len()];
+            self.shares = vec![(0.0, [f64::INFINITY; COLUMNS]); self.len()];
             self.objectives.iter().for_each(|row| self.columns.push(row));
             // No point lies at it, so that all shares are worked out.
             self.reference.clear();
@@ -253,7 +260,12 @@ impl Archive {
 
     fn by_contribution(&self) -> bool {
         let width = self.objectives.first().map_or(0, Vec::len);
-        self.truncation == Truncation::Contribution && width <= 3
+        let most = match self.fixed {
+            true => MOST_MEASURED,
+            false if self.capacity <= FEW => MOST_MOVING,
+            false => COLUMNS,
+        };
+        self.truncation == Truncation::Contribution && width <= most
     }
 
     fn drop_member(&mut self, i: usize) {
@@ -282,14 +294,30 @@ impl Archive {
         for i in 0..self.len() {
             // Only what lies at or below the corner of a member's box touches its share, and only where no other lies between:
             // on a front that is nearly a curve, its neighbours.
-            let reaches = |corner: &[f64; 3]| change.iter().zip(corner).all(|(x, corner)| x <= corner);
-            let touched = moved
-                || new == Some(i)
-                || (reaches(&self.shares[i].1) && self.columns.touches(change, new, i, &self.reference));
+            let reaches = |corner: &[f64; COLUMNS]| change.iter().zip(corner).all(|(x, corner)| x <= corner);
+            let touched =
+                moved || new == Some(i) || (reaches(&self.shares[i].1) && self.touches(change, new, i));
             if touched {
-                self.shares[i] = self.columns.exclusive(i, &self.reference);
+                self.shares[i] = self.share(i);
             }
         }
+    }
+
+    /// What member `i` alone dominates, and the far corner of the box that this lies in.
+    fn share(&self, i: usize) -> (f64, [f64; COLUMNS]) {
+        if self.reference.len() > COLUMNS {
+            let share = exclusive_of(&self.objectives, i, &self.reference);
+            return (share, [f64::INFINITY; COLUMNS]);
+        }
+        self.columns.exclusive(i, &self.reference)
+    }
+
+    /// Whether a point that came, as a member, or left can have changed what member `i` alone dominates.
+    fn touches(&self, change: &[f64], came: Option<usize>, i: usize) -> bool {
+        if self.reference.len() > COLUMNS {
+            return touches_of(&self.objectives, change, came, i, &self.reference);
+        }
+        self.columns.touches(change, came, i, &self.reference)
     }
 
     fn range(&self, k: usize) -> (f64, f64) {
@@ -438,9 +466,12 @@ mod tests {
     /// volume.
     #[test]
     fn shares_stay_exact() {
-        for width in [2, 3] {
+        for width in [2, 3, 4, 5] {
             let mut archive = Archive::new(15, Truncation::Contribution);
-            for p in points(width, 600) {
+            if width > COLUMNS {
+                archive = archive.measured_from(vec![70.0; width]);
+            }
+            for p in points(width as u32, 600) {
                 archive.insert(&p, &p);
                 let fresh = contributions(&archive.objectives, &archive.reference).unwrap();
                 assert_eq!(archive.worth(), fresh);
@@ -454,7 +485,7 @@ mod tests {
         /// Whatever comes, one at a time or many at once, and wherever the reference lies.
         #[test]
         fn hypervolume_never_falls(
-            seed in any::<u64>(), width in 1usize..4, capacity in 1usize..20, at in 0.2..1.5f64, batch in 1usize..30,
+            seed in any::<u64>(), width in 1usize..6, capacity in 1usize..20, at in 0.2..1.5f64, batch in 1usize..30,
         ) {
             let random = Random::new(seed);
             let reference = vec![at; width];

@@ -227,7 +227,7 @@ impl<'f> Minimise<'f> {
         }
     }
 
-    /// The point up to which the history tells the hypervolume, for two or three objectives.
+    /// The point up to which the history tells the hypervolume.
     pub fn reference(self, reference: Vec<f64>) -> Self {
         Self {
             reference: Some(reference),

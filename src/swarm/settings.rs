@@ -1,5 +1,6 @@
 //! Settings of the swarms, validated in one place.
 
+use super::archive::MOST_MEASURED;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -208,7 +209,8 @@ pub enum Leaders {
 pub enum Truncation {
     /// The least crowding distance \[5\].
     Crowding,
-    /// The least volume that a member alone dominates \[8\]; for more than three objectives as `MutualNearest`.
+    /// The least volume that a member alone dominates \[8\]; with a reference for up to five objectives,
+    /// without one for up to four, or three with more than 200 members; as `MutualNearest` beyond.
     Contribution,
     /// The least distance to the nearest neighbour, then to the next \[9\].
     MutualNearest,
@@ -259,7 +261,7 @@ pub struct MopsoSettings {
     pub archive: usize,
     /// Which members leave a full archive.
     pub truncation: Truncation,
-    /// The reference point of contributions, a value for each of up to three objectives. The archive's hypervolume up to this
+    /// The reference point of contributions, a value for each of up to five objectives. The archive's hypervolume up to this
     /// point then never falls. With `None` the archive chooses the point and keeps the ends of its front.
     pub reference: Option<Vec<f64>>,
     /// Choice of leaders.
@@ -349,8 +351,9 @@ impl MopsoSettings {
         }
         if let Some(reference) = &self.reference {
             let found = format!("{reference:?} with truncation by {:?}", self.truncation);
-            let expected = "one to three numbers, with truncation by contribution";
-            let numbers = (1..=3).contains(&reference.len()) && reference.iter().all(|x| x.is_finite());
+            let expected = "one to five numbers, with truncation by contribution";
+            let numbers =
+                (1..=MOST_MEASURED).contains(&reference.len()) && reference.iter().all(|x| x.is_finite());
             if !numbers || self.truncation != Truncation::Contribution {
                 return Err(setting("reference", found, expected));
             }

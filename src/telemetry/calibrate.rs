@@ -51,7 +51,10 @@ pub(super) fn apply(log: &mut Log, options: &CalibrationOptions, declared: &Decl
         signs(log, declared);
     }
     if options.offsets == Switch::On {
-        offsets(log);
+        offsets(log, declared);
+    }
+    if declared.made.contains(&Role::Ay) {
+        log.ay_mps2 = product(&log.vx_mps, &log.yaw_rate_radps);
     }
     if options.rolling_radius == Switch::On {
         rolling_radii(log, declared);
@@ -77,24 +80,17 @@ fn signs(log: &mut Log, declared: &Declared) {
         sign(log, declared, Role::YawRate, Some(found), evidence);
     }
     let turning = product(&log.vx_mps, &log.yaw_rate_radps);
-    let found = fit(&turning, &log.ay_mps2, &moving);
-    sign(
-        log,
-        declared,
-        Role::Ay,
-        found,
-        "against ground speed times yaw rate",
-    );
-    gain(log, Role::Ay, found, "ground speed times yaw rate");
-    let found = fit(&accel, &log.ax_mps2, &moving);
-    sign(
-        log,
-        declared,
-        Role::Ax,
-        found,
-        "against the change of ground speed",
-    );
-    gain(log, Role::Ax, found, "the change of ground speed");
+    for (role, reference, of) in [
+        (Role::Ay, &turning, "ground speed times yaw rate"),
+        (Role::Ax, &accel, "the change of ground speed"),
+    ] {
+        if declared.made.contains(&role) {
+            continue;
+        }
+        let found = fit(reference, values_mut(log, role), &moving);
+        sign(log, declared, role, found, &format!("against {of}"));
+        gain(log, role, found, of);
+    }
     let found = fit(&log.yaw_rate_radps, &log.steer_rad, &moving);
     sign(log, declared, Role::Steer, found, "against yaw rate");
 }
@@ -329,12 +325,14 @@ fn ay_offset(log: &Log, laps: &[(Lap, f64)]) -> Option<Offset> {
     })
 }
 
-fn offsets(log: &mut Log) {
+fn offsets(log: &mut Log, declared: &Declared) {
     let laps = closed_laps(log);
     let of_yaw = offset_of_laps(log, &laps).or_else(|| offset_at_rest(log));
     take_off(log, Role::YawRate, of_yaw, LEAST_YAW_OFFSET);
-    let of_ay = ay_offset(log, &laps);
-    take_off(log, Role::Ay, of_ay, LEAST_AY_OFFSET);
+    if !declared.made.contains(&Role::Ay) {
+        let of_ay = ay_offset(log, &laps);
+        take_off(log, Role::Ay, of_ay, LEAST_AY_OFFSET);
+    }
 }
 
 fn take_off(log: &mut Log, role: Role, offset: Option<Offset>, least: f64) {

@@ -171,4 +171,6 @@ pub(super) struct Declared {
     pub rear_is_undriven: bool,
     /// Ground speed was computed from wheel speeds and has no delay of its own.
     pub speed_of_wheels: bool,
+    /// Accelerations that were computed from other channels, whose signs and offsets they have.
+    pub made: Vec<Role>,
 }

@@ -364,6 +364,22 @@ fn a_ratio_of_the_channel_map_is_not_judged() {
     assert!((log.steer_rad[700] - perfect().steer_rad[700]).abs() < 1e-9);
 }
 
+/// A lateral acceleration that is computed from speed and yaw rate follows what is found of these, and has no findings of its own.
+#[test]
+fn an_acceleration_that_is_computed_has_no_faults_of_its_own() {
+    let mut log = perfect();
+    log.yaw_rate_radps.iter_mut().for_each(|r| *r = 0.01 - *r);
+    let found = read(&exported(&log).replace("G Force Lat", "Board G"), "", &options());
+    let of_ay = found.calibration.findings.iter().filter(|f| f.role == Role::Ay);
+    assert_eq!(of_ay.count(), 0);
+    let sign = found.calibration.finding(Role::YawRate, FindingKind::Sign);
+    let offset = found.calibration.finding(Role::YawRate, FindingKind::Offset);
+    assert!(sign.unwrap().applied && offset.unwrap().applied);
+    let places = found.ay_mps2.iter().zip(&found.vx_mps).zip(&found.yaw_rate_radps);
+    assert!(places.into_iter().all(|((ay, v), r)| *ay == v * r));
+    assert!((found.yaw_rate_radps[700] - perfect().yaw_rate_radps[700]).abs() < 5e-4);
+}
+
 #[test]
 fn a_log_without_wheel_speeds_is_read() {
     let log = perfect();

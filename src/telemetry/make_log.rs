@@ -87,6 +87,10 @@ impl Log {
             radius_is_free: options.radius_is_free,
             rear_is_undriven: map.speed_axle == Axle::Rear,
             speed_of_wheels: !mapped.iter().any(|m| m.role == Role::Vx),
+            made: [Role::Ax, Role::Ay]
+                .into_iter()
+                .filter(|role| !mapped.iter().any(|m| m.role == *role))
+                .collect(),
         };
         for m in mapped
             .iter()

@@ -233,22 +233,6 @@ impl Circuit {
         Some(relief.facts(&self.station_m, widths, self.spacing_m(), self.closed))
     }
 
-    /// Refuses a road that is not level and dry, for what would leave its surface out.
-    ///
-    /// # Errors
-    /// [`Error::Input`] naming what does not know them.
-    pub fn level_only(&self, what: &str) -> Result<()> {
-        if self.relief.is_none() {
-            return Ok(());
-        }
-        Err(Error::input(
-            &self.name,
-            "height, banking and friction",
-            "a road that is not level and dry",
-            super::relief::level_road(what),
-        ))
-    }
-
     fn frame_in_lap(&self, station_m: f64) -> Frame {
         let at = self.locate(station_m);
         let (heading, curvature) = (self.heading_rad[at.before], self.curvature_1pm[at.before]);

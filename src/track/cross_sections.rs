@@ -2,7 +2,7 @@
 
 use super::circuit::{Corner, Section};
 use super::crossing::bridges;
-use super::relief::{SectionRelief, Surface, beside, cubic, level_road, mixed};
+use super::relief::{SectionRelief, Surface, beside, cubic, mixed};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::ops::Range;
@@ -350,23 +350,6 @@ impl CrossSections {
             relief.at(i, left, *point)
         };
         Some(points_m.iter().enumerate().map(at).collect())
-    }
-
-    /// Refuses a road that is not level and dry, for what would leave its surface out.
-    ///
-    /// # Errors
-    /// [`Error::Input`] naming what does not know them.
-    pub fn level_only(&self, what: &str) -> Result<()> {
-        if self.relief.is_none() {
-            return Ok(());
-        }
-        let found = "a road that is not level and dry";
-        Err(Error::input(
-            &self.name,
-            "height, banking and friction",
-            found,
-            level_road(what),
-        ))
     }
 
     /// The points of a line (m), one per cross-section, from its `alpha` at every cross-section.

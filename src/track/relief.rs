@@ -420,14 +420,6 @@ pub(super) fn mixed(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
     [0, 1].map(|k| from[k] + share * (to[k] - from[k]))
 }
 
-/// What is asked for where the surface is not known.
-pub(super) fn level_road(what: &str) -> String {
-    format!(
-        "a level and dry road: {what} would leave height, banking and friction out; a TOML file of the road with `flat = true` does so \
-         knowingly"
-    )
-}
-
 /// The cubic through four figures at even steps, `t` of the way from the second to the third (E. Catmull, R. Rom, *A class of local
 /// interpolating splines*, 1974).
 pub(super) fn cubic([a, b, c, d]: [f64; 4], t: f64) -> f64 {
@@ -504,7 +496,6 @@ mod tests {
             stretch.relief.as_ref().unwrap().z_m[15],
             road.relief.as_ref().unwrap().z_m[5]
         );
-        assert!(road.level_only("this").is_err() && stretch.level_only("this").is_err());
     }
 
     /// Friction at both edges is linear across the road and between the rows, and comes back from an exported file.

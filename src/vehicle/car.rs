@@ -214,6 +214,11 @@ impl Car {
         coefficient * self.chassis.gravity
     }
 
+    /// Mass that the engine accelerates over that of the car; 1 without a powertrain.
+    pub fn rotating_mass_factor(&self) -> f64 {
+        self.powertrain.as_ref().map_or(1.0, |p| p.rotating_mass_factor)
+    }
+
     /// Writes `<stem>.toml` and the tyre files it names into `folder`.
     ///
     /// # Errors

@@ -113,6 +113,11 @@ impl MassLimits {
             let (open, _) = Self { rows }.carry((open, &own), from_kg, to_kg)?;
             carried = carried.with_open(open)?;
         }
+        // Under other loads limits change with the mass as under the weight.
+        let carried = carried.with_loads_of(envelope, &|limits| {
+            let own = limits.straight_traction().unwrap_or_else(|| traction.clone());
+            Ok(self.carry((limits, &own), from_kg, to_kg)?.0)
+        })?;
         Ok((carried, traction))
     }
 

@@ -105,6 +105,16 @@ pub fn kernels() -> Vec<KernelSource> {
                 let motor = if additional { "adds" } else { "shares" };
                 let source = energy_shape(closed, terms, additional).source();
                 add("energy_line", &format!("{of}, motor {motor}"), source);
+                let hills = EnergyShape {
+                    line: hills,
+                    uniform_energy: None,
+                    ..energy_shape(closed, terms, additional)
+                };
+                add(
+                    "energy_line",
+                    &format!("{of}, motor {motor}, hills"),
+                    hills.source(),
+                );
             }
         }
     }

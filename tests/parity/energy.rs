@@ -14,8 +14,9 @@ use lapswarm::evaluate::{Evaluator, Failure};
 use lapswarm::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
 use lapswarm::line::{Parametrisation, geometry};
 use lapswarm::parity::energy::{Allowed, allowed};
-use lapswarm::vehicle::Car;
+use lapswarm::parity::in_relief;
 use lapswarm::vehicle::limits::{SpeedRange, car_envelope};
+use lapswarm::vehicle::{Car, Traction};
 
 tests! {
     laps_with_energy_agree_and_balance: also_device,
@@ -87,11 +88,32 @@ fn problems() -> Vec<(String, HybridProblem)> {
                 points_m: middle.clone(),
                 closed,
                 drs: Vec::new(),
+                surface: Vec::new(),
             };
-            for (name, line) in [("free", free), ("fixed", fixed)] {
+            let car = hybrid_car(exponent);
+            let (hills, loaded) = in_relief(&cross_sections, &car.point_mass).expect("sound limits");
+            let traction = Traction::of(&car.car, &loaded.envelope);
+            let loaded = EnergyCar::of(car.car.clone(), loaded, traction).expect("a hybrid");
+            let fixed_in_hills = HybridLine::Fixed {
+                points_m: middle.clone(),
+                closed,
+                drs: Vec::new(),
+                surface: hills.relief_of(&middle).expect("a surface"),
+            };
+            let free_in_hills = HybridLine::Free {
+                cross_sections: Box::new(hills),
+                parametrisation: Parametrisation::control_points(sections / 6),
+            };
+            let lines = [
+                ("free", free, &car),
+                ("fixed", fixed, &car),
+                ("free in hills", free_in_hills, &loaded),
+                ("fixed in hills", fixed_in_hills, &loaded),
+            ];
+            for (name, line, car) in lines {
                 let problem = HybridProblem::new(
                     line,
-                    hybrid_car(exponent),
+                    car.clone(),
                     plan.clone(),
                     strategy.clone(),
                     &HybridObjective::ALL,

@@ -21,11 +21,12 @@ struct Bar {
 
 /// As Mesa 22.3 compiles them. A wave of 128 vector registers runs beside seven others on a SIMD of navi21. The first that fits a kernel
 /// holds for it.
-const BARS: [Bar; 11] = [
+const BARS: [Bar; 12] = [
     bar("drive: by axle, magic formula", [168, 132, 164], [0, 33, 0]).of("hills"),
     bar("line: open, 0 terms", [64, 60, 64], [0; 3]).of("hills"),
     bar("line: ", [48, 48, 48], [0; 3]).of("hills"),
     bar("by axle, linear", [120, 120, 116], [0; 3]).of("hills"),
+    bar("energy_line: ", [80, 84, 84], [0; 3]).of("hills"),
     bar("replay: by axle, magic formula", [120, 120, 120], [0; 3]),
     bar("settle: by axle, magic formula", [128, 132, 124], [0; 3]),
     bar("drive: by axle, magic formula", [160, 132, 160], [0, 30, 0]),

@@ -194,6 +194,7 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("load_most", offset_of!(LineStretch, load_most)),
         ("lock_radius", offset_of!(LineStretch, lock_radius)),
         ("gravity", offset_of!(LineStretch, gravity)),
+        ("coasting", offset_of!(LineStretch, coasting)),
         ("spare", offset_of!(LineStretch, spare)),
     ];
     let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {

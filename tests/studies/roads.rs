@@ -445,6 +445,7 @@ fn deployments_start_from_a_standstill() {
         points_m: half,
         closed: false,
         drs: &[],
+        surface: &[],
         run_in: 0,
         entry_mps: 0.0,
     };

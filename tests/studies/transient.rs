@@ -1,6 +1,7 @@
 //! A line driven by the 4DOF car, and the whole way from a log to a lap.
 
 use crate::solve;
+use glam::DVec2;
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::line::energy::{Gates, Mode};
@@ -62,9 +63,37 @@ fn population_of(outcome: &Outcome) -> &PopulationOutcome {
 /// Both laps move the same car over the same way, and the books balance.
 #[test]
 fn a_hybrids_lap_has_accounts_that_agree_with_the_quasi_steady_state_lap() {
-    let track = "stadium:400:120:14";
     let road = stadium();
     let points = road.cross_sections.points(&road.cross_sections.reference);
+    // A lap that is up to half a percent slower has a percent less of energy in its speed; measured is 1.4 %.
+    accounts_agree("stadium:400:120:14", &points, 2.0);
+}
+
+/// The same on a road with hills of 20 m and a slippery quarter.
+#[test]
+fn a_hybrids_lap_in_hills_has_accounts_that_agree() {
+    let road = stadium();
+    let points = road.cross_sections.points(&road.cross_sections.reference);
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / points.len() as f64;
+    let row = |(i, p): (usize, &DVec2)| {
+        let z = 9.0 * angle(i).sin() + 1.5 * (3.0 * angle(i)).cos();
+        let friction = 1.0 - 0.2 * angle(i).cos().max(0.0);
+        format!("{},{},7,7,{z},{friction}\n", p.x, p.y)
+    };
+    let rows: String = points.iter().enumerate().map(row).collect();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let track = folder.path().join("hills.csv");
+    std::fs::write(
+        &track,
+        format!("# x_m,y_m,w_tr_right_m,w_tr_left_m,z_m,friction\n{rows}"),
+    )
+    .expect("a file");
+    accounts_agree(&track.display().to_string(), &points, 3.0);
+}
+
+/// Drives the bundled hybrid on a line of a track, by the engine alone and with the motor, and holds the accounts against those of the
+/// quasi-steady-state laps. The work that moves the car may differ by so much (%).
+fn accounts_agree(track: &str, points: &[DVec2], moving_percent: f64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let line = folder.path().join("middle.csv");
     let rows: String = points.iter().map(|p| format!("{},{}\n", p.x, p.y)).collect();
@@ -152,8 +181,7 @@ fn a_hybrids_lap_has_accounts_that_agree_with_the_quasi_steady_state_lap() {
         assert!(energy.deployed_difference_percent.abs() < 3.0);
         // The driver brakes later than his plan and harder, beyond the generator's power for longer.
         assert!(energy.harvested_k_difference_percent.abs() < 5.0);
-        // A lap that is up to half a percent slower has a percent less of energy in its speed; measured is 1.4 %.
-        assert!(energy.moving_difference_percent.abs() < 2.0);
+        assert!(energy.moving_difference_percent.abs() < moving_percent);
         assert!(energy.driven.tyres_mj > 0.0);
     }
     let out = |summary: &LineSummary| summary.energy.as_ref().expect("accounts").driven.deployed_mj;

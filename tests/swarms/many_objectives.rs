@@ -2,6 +2,7 @@
 
 use lapswarm::evaluate::point::{CallCost, Constraint, PointEvaluator};
 use lapswarm::evaluate::{Objective, Problem, Variable};
+use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::swarm::{Moead, MoeadSettings, Optimiser, Sizes, by_name, run};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
@@ -99,6 +100,29 @@ fn many_objectives() {
             assert!(reached < theirs, "{objectives}, {other}: {reached}, {theirs}");
         }
     }
+}
+
+/// The default truncates an archive of four objectives by hypervolume. Up to 1.1, DTLZ2's whole front has `1.1^4 - pi^2 / 32`, 1.1557. A
+/// hundred members came to 1.0437 to 1.0438 of it in three runs of 25,000 evaluations, and those of NSGA-III to 1.010 to 1.012.
+#[test]
+fn the_default_covers_the_volume_of_four_objectives() {
+    let problem = problem(13, 4);
+    let volume = |name: &str| {
+        let sizes = Sizes {
+            population: 100,
+            iterations: 250,
+            archive: 100,
+            seed: 4,
+        };
+        let mut optimiser = by_name(name, &problem, sizes).unwrap();
+        let mut evaluator = PointEvaluator::new(problem.clone(), CallCost::Cheap, dtlz2);
+        run(optimiser.as_mut(), &mut evaluator, |_| ControlFlow::Continue(())).unwrap();
+        hypervolume(&optimiser.front().objectives, &[1.1; 4]).unwrap()
+    };
+    let (own, genetic) = (volume("default"), volume("nsga3"));
+    println!("hypervolume {own:.4}, NSGA-III {genetic:.4}");
+    assert!(own > 1.043 && own < 1.1557, "{own}");
+    assert!(own > genetic + 0.025, "{own} {genetic}");
 }
 
 /// With objectives measured as they are, each run is held to the worst of six of pymoo 0.6.2 with the same settings, 8.161e-4. With

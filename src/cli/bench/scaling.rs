@@ -231,7 +231,7 @@ pub(super) fn steady(front: bool) -> Result<Case<SteadyProblem>> {
 }
 
 pub(super) fn energy(front: bool) -> Result<Case<HybridProblem>> {
-    let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional], false)?;
+    let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional], false, false)?;
     let mut hybrid = problems.remove(0);
     if front {
         hybrid = hybrid.by(&HybridObjective::ALL[..3])?;

@@ -6,7 +6,7 @@ use crate::evaluate::{Problem, Variable};
 use crate::line::energy::{EnergyCar, EnergyPlan, GATES, Gates};
 use crate::line::kernel::{Course, Wanted, shape};
 use crate::line::{LinePlan, Parametrisation};
-use crate::track::CrossSections;
+use crate::track::{CrossSections, Surface};
 use glam::DVec2;
 
 objectives! {
@@ -38,6 +38,8 @@ pub enum HybridLine {
         closed: bool,
         /// Whether the DRS may be open from each point to the next; nowhere if empty.
         drs: Vec<bool>,
+        /// The surface at each point; empty on a level and dry road.
+        surface: Vec<Surface>,
     },
     /// A line across cross-sections, given by the first variables.
     Free {
@@ -168,19 +170,23 @@ impl HybridProblem {
                 points_m,
                 closed,
                 drs,
-            } => (LinePlan::of_points(points_m, *closed).with_drs(drs), Vec::new()),
+                surface,
+            } => {
+                let plan = LinePlan::of_points(points_m, *closed).with_drs(drs);
+                (plan.with_surface(surface), Vec::new())
+            }
             HybridLine::Free {
                 cross_sections,
                 parametrisation,
             } => {
-                cross_sections.level_only("a lap with energy")?;
                 let mut plan = LinePlan::of_cross_sections(
                     &cross_sections.right_m,
                     &cross_sections.left_m,
                     cross_sections.closed,
                 )
                 .spaced(&cross_sections.spacing_m())
-                .with_drs(&cross_sections.drs);
+                .with_drs(&cross_sections.drs)
+                .with_relief(cross_sections);
                 parametrisation.apply(cross_sections, &mut plan)?;
                 (plan, parametrisation.variables(cross_sections))
             }
@@ -188,6 +194,11 @@ impl HybridProblem {
         let n = plan.rows.len();
         if n < 3 {
             return wrong("sections", n.to_string(), "at least three");
+        }
+        if !plan.relief.is_empty() && (plan.relief.len() != n || !car.point_mass.relief) {
+            let found = format!("a surface at {} of {n} sections", plan.relief.len());
+            let expected = "one at each, and a car with limits under loads";
+            return wrong("surface", found, expected);
         }
         if energy.zones.len() != n || energy.run_in >= n {
             let found = format!("{} rows, run-in from {}", energy.zones.len(), energy.run_in);

@@ -23,7 +23,6 @@ pub struct EnergyCar {
     /// The car that it was made from.
     pub car: Car,
     traction: Traction,
-    ellipse_exponent: f64,
 }
 
 impl EnergyCar {
@@ -32,14 +31,23 @@ impl EnergyCar {
     /// # Errors
     /// [`crate::Error::Input`] for a car without engine map or hybrid drive, or limits that cannot be.
     pub fn new(car: Car, envelope: Envelope, traction: Traction, ellipse_exponent: f64) -> Result<Self> {
-        let (_, engine, hybrid) = hybrid_parts(&car)?;
-        let (fuel_density_kgpl, hybrid) = (engine.fuel_density_kgpl, hybrid.clone());
         let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
         let point_mass = PointMass {
             ellipse_exponent,
             max_steer_rad: Some(car.max_steer_rad),
+            rotating_mass_factor: car.rotating_mass_factor(),
             ..PointMass::new(envelope, wheelbase)
         };
+        Self::of(car, point_mass, traction)
+    }
+
+    /// `car` as this point mass, within `traction`.
+    ///
+    /// # Errors
+    /// As [`EnergyCar::new`].
+    pub fn of(car: Car, point_mass: PointMass, traction: Traction) -> Result<Self> {
+        let (_, engine, hybrid) = hybrid_parts(&car)?;
+        let (fuel_density_kgpl, hybrid) = (engine.fuel_density_kgpl, hybrid.clone());
         let envelope_table = point_mass.table()?;
         let table = EnergyTable::new(&car, &point_mass.envelope, &traction, &envelope_table)?;
         Ok(Self {
@@ -50,9 +58,17 @@ impl EnergyCar {
             table,
             hybrid,
             traction,
-            ellipse_exponent,
             car,
         })
+    }
+
+    /// Another car on the same roads, within other limits.
+    fn with(&self, car: Car, envelope: Envelope, traction: Traction) -> Result<Self> {
+        let point_mass = PointMass {
+            envelope,
+            ..self.point_mass.clone()
+        };
+        Self::of(car, point_mass, traction)
     }
 
     /// The same car with another hybrid drive.
@@ -62,12 +78,7 @@ impl EnergyCar {
     pub fn with_hybrid(&self, hybrid: Hybrid) -> Result<Self> {
         let mut car = self.car.clone();
         car.hybrid = Some(hybrid);
-        Self::new(
-            car,
-            self.point_mass.envelope.clone(),
-            self.traction.clone(),
-            self.ellipse_exponent,
-        )
+        self.with(car, self.point_mass.envelope.clone(), self.traction.clone())
     }
 
     /// The same car with another mass (kg), within the limits that it has then.
@@ -79,7 +90,7 @@ impl EnergyCar {
         let (envelope, traction) = limits.carry(own, self.car.chassis.mass, mass_kg)?;
         let mut car = self.car.clone();
         car.chassis.mass = mass_kg;
-        Self::new(car, envelope, traction, self.ellipse_exponent)
+        self.with(car, envelope, traction)
     }
 
     /// The same car with torque and fuel flow of the engine multiplied by `share` at every engine speed, within its traction.
@@ -102,7 +113,7 @@ impl EnergyCar {
                 ..*row
             }
         })?;
-        Self::new(car, envelope, self.traction.clone(), self.ellipse_exponent)
+        self.with(car, envelope, self.traction.clone())
     }
 
     /// The figures of gates that kernels read.

@@ -57,8 +57,10 @@ pub struct DrivenMoment {
     pub station_m: f64,
     /// Speed (m/s).
     pub speed_mps: f64,
-    /// Longitudinal acceleration (m/s^2).
+    /// Change of the speed (m/s^2).
     pub ax_mps2: f64,
+    /// The part of gravity that the car climbs against (m/s^2), positive uphill.
+    pub climb_mps2: f64,
     /// Power of the front and of the rear wheels on the road (W), negative when braking: force times the speed of the rim.
     pub wheels_w: [f64; 2],
     /// Drag of the air (N).
@@ -72,7 +74,7 @@ pub struct DrivenLapEnergy {
     pub lap: EnergyLap<f64>,
     /// From each moment to the next.
     pub segments: Vec<SegmentEnergy<f64>>,
-    /// Work that moves the car along its way (J), where it is driven: against drag, rolling resistance and inertia. What engine and
+    /// Work that moves the car along its way (J), where it is driven: against drag, rolling resistance, inertia and gravity. What engine and
     /// motor bring to the wheels beyond that is lost in the tyres, which slip and which drag in bends.
     pub moving_j: f64,
 }
@@ -165,7 +167,7 @@ pub fn driven_energy(car: &EnergyCar, plan: &MotorPlan, moments: &[DrivenMoment]
         );
         segment.hydraulic += braking - shed;
         let ax = 0.5 * (next * next - moment.speed_mps.powi(2)) / length;
-        let moving = table.rotating * ax + moment.drag_n / table.mass + rolling;
+        let moving = table.rotating * ax + moment.drag_n / table.mass + rolling + moment.climb_mps2;
         driven.moving_j += table.mass * length * moving.max(0.0);
         lap.time += segment.time;
         lap.fuel += segment.fuel;

@@ -5,7 +5,7 @@
 //! still brake for all that follows. The lap itself is a forward pass below these speeds. It goes from section to section, so it
 //! knows the charge of the store and the energy used so far, on which the gates of the motor depend. Energies are counted from
 //! the start line. The car must cross it at the speed with which it ends the lap, so a closed lap is driven twice: once to find
-//! that speed and once for the accounts.
+//! that speed and once for the accounts. On a road in three dimensions the forces at the wheels also lift the car.
 //!
 //! The MGU-H is a machine on the turbocharger's shaft: what it generates costs power at the crank. At part load the engine burns
 //! for it by its map. At full load the engine cannot give more, and the car is slower for it. Where the motor replaces the engine,
@@ -15,6 +15,7 @@
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
 
+use super::super::ground::{Ground, Grounds, LevelRoad, SlopedRoad};
 use super::super::kernel::{BLOCK, Course, braked, corner, driving_with_drs, look_up, may_open};
 use super::super::point_mass::EnvelopeTable;
 use super::figures::{EnergyLap, SegmentEnergy};
@@ -103,24 +104,27 @@ fn flow_at<R: Real>(flows: [R; 4], load: R) -> R {
 
 impl<R: Lookup> Car<'_, R> {
     /// The traction that is left, the drive that the tyres leave, the drag and what the tyres take (m/s^2) on a segment, at a speed
-    /// squared in a bend.
+    /// squared.
     #[inline(always)]
-    fn driving_at(&self, here: usize, speed_squared: R, curvature: R) -> [R; 4] {
-        driving_with_drs(self.envelope, may_open(self.drs, here), speed_squared, curvature)
+    fn driving_at(&self, here: usize, speed_squared: R, ground: impl Ground<R>) -> [R; 4] {
+        driving_with_drs(self.envelope, may_open(self.drs, here), speed_squared, ground)
     }
 
-    /// What an open DRS sheds of the drag, and what the tyres take (m/s^2) on a segment, at a mean speed squared and curvature.
+    /// The drag with the DRS shut, what an open one sheds of it, and what the tyres take (m/s^2) on a segment, at a mean speed squared.
+    /// `level` is the drag on a level road.
     #[inline(always)]
-    fn shed_and_lost(&self, here: usize, speed_squared: R, curvature: R) -> [R; 2] {
-        if self.envelope.traction.is_empty() && self.envelope.open.is_none() {
-            return [R::lit(0.0); 2];
+    fn resistance<G: Ground<R>>(&self, here: usize, speed_squared: R, ground: G, level: R) -> [R; 3] {
+        let zero = R::lit(0.0);
+        if G::LEVEL && self.envelope.traction.is_empty() && self.envelope.open.is_none() {
+            return [level, zero, zero];
         }
-        let [.., shut, lost] = driving_with_drs(self.envelope, false, speed_squared, curvature);
+        let [.., shut, lost] = driving_with_drs(self.envelope, false, speed_squared, ground);
+        let drag = if G::LEVEL { level } else { shut };
         if self.envelope.open.is_none() || !may_open(self.drs, here) {
-            return [R::lit(0.0), lost];
+            return [drag, zero, lost];
         }
-        let [.., drag, lost] = self.driving_at(here, speed_squared, curvature);
-        [shut - drag, lost]
+        let [.., open, lost] = self.driving_at(here, speed_squared, ground);
+        [drag, shut - open, lost]
     }
 
     /// Whether the gates of steering and speed are open at a section.
@@ -163,19 +167,27 @@ impl<R: Lookup> Car<'_, R> {
     /// greatest speed squared at its end. `store` has the energy that may leave the store and the space that is in it (J): while
     /// there is some, the MGU-H lowers what an engine at full load gives.
     #[inline(always)]
-    fn additional(&self, here: usize, from: R, length: R, bends: [R; 2], most: R, store: [R; 2]) -> Step<R> {
+    fn additional<G: Ground<R>>(
+        &self,
+        here: usize,
+        from: R,
+        length: R,
+        bends: [G; 2],
+        most: R,
+        store: [R; 2],
+    ) -> Step<R> {
         let [left, space] = store;
         let inverse = R::lit(1.0) / length;
         let zero = R::lit(0.0);
         let [traction, drive, drag, _] = self.driving_at(here, from, bends[0]);
-        let engine = traction.min(drive);
-        let ahead = (from + length * (engine - drag)).max(zero);
+        let alone = bends[0].uphill(traction.min(drive) - drag);
+        let ahead = (from + length * alone).max(zero);
         let rows = self.table.boosts.len() / 8;
         let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 8);
         let [motor, room, exhaust] =
             [0, 1, 2].map(|column| look_up(&self.table.boosts, 8, place, beyond, column));
         let greatest = (motor * self.strategy[5]).min(room);
-        let open = self.open(bends[0], from) & self.strategy[2].less_than(engine - drag);
+        let open = self.open(bends[0].bend(), from) & self.strategy[2].less_than(alone);
         let share = zone_share(&self.plan.zones[here], self.strategy);
         let reach = self.boost(left, inverse);
         let gain = if self.table.assists {
@@ -191,19 +203,22 @@ impl<R: Lookup> Car<'_, R> {
         let own = wanted.min(reach);
         let assist = (both_wanted - wanted).min((reach - own) * R::load(self.table.assist_share));
         let boost = own + assist;
-        let spins = self.spins(from, traction.min(drive + boost) - drag) & R::lit(LEAST_J).less_than(space);
+        let ax = bends[0].uphill(traction.min(drive + boost) - drag);
+        let spins = self.spins(from, ax) & R::lit(LEAST_J).less_than(space);
         let exhaust = gated(spins, exhaust);
 
         let drive = drive - exhaust;
         let engine = traction.min(drive);
         let both = traction.min(drive + boost);
-        let middle = (from + length * (both - drag)).max(zero);
-        let [traction, drive, later_drag, _] =
-            self.driving_at(here, middle, R::lit(0.5) * (bends[0] + bends[1]));
+        let first = bends[0].uphill(both - drag);
+        let middle = (from + length * first).max(zero);
+        let half_way = bends[0].half_way(bends[1]);
+        let [traction, drive, later_drag, _] = self.driving_at(here, middle, half_way);
         let drive = drive - exhaust;
         let later_both = traction.min(drive + boost);
         let motor = R::lit(0.5) * ((both - engine) + (later_both - traction.min(drive)));
-        let reached = (from + length * ((both - drag) + (later_both - later_drag))).max(zero);
+        let second = half_way.uphill(later_both - later_drag);
+        let reached = (from + length * (first + second)).max(zero);
         let end = reached.min(most);
         // Where less force is needed than both can give, the motor is reduced first, and of the motors the dearer one.
         let spare = R::lit(0.5) * (reached - end) * inverse;
@@ -222,14 +237,14 @@ impl<R: Lookup> Car<'_, R> {
     /// the same energy and space in every lane. After the first slow bend the two drives differ only where the store runs out.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    fn additional_again(
+    fn additional_again<G: Ground<R>>(
         &self,
         first: Option<[R; 5]>,
         before: R,
         here: usize,
         from: R,
         length: R,
-        bends: [R; 2],
+        bends: [G; 2],
         most: R,
         store: [R; 2],
     ) -> Step<R> {
@@ -259,20 +274,28 @@ impl<R: Lookup> Car<'_, R> {
 
     /// Drives along a segment by the engine alone.
     #[inline(always)]
-    fn engine_only(&self, here: usize, from: R, length: R, bends: [R; 2], most: R) -> R {
+    fn engine_only<G: Ground<R>>(&self, here: usize, from: R, length: R, bends: [G; 2], most: R) -> R {
         let zero = R::lit(0.0);
         let [traction, drive, drag, _] = self.driving_at(here, from, bends[0]);
-        let first = traction.min(drive) - drag;
+        let first = bends[0].uphill(traction.min(drive) - drag);
         let middle = (from + length * first).max(zero);
-        let [traction, drive, drag, _] = self.driving_at(here, middle, R::lit(0.5) * (bends[0] + bends[1]));
-        let second = traction.min(drive) - drag;
+        let half_way = bends[0].half_way(bends[1]);
+        let [traction, drive, drag, _] = self.driving_at(here, middle, half_way);
+        let second = half_way.uphill(traction.min(drive) - drag);
         (from + length * (first + second)).max(zero).min(most)
     }
 
     /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
     /// and what the MGU-K harvests where the charge matters. The small charge by the MGU-H is left out here.
     #[inline(always)]
-    fn provisional(&self, state: &mut State<R>, here: usize, length: R, bends: [R; 2], most: R) -> Step<R> {
+    fn provisional<G: Ground<R>>(
+        &self,
+        state: &mut State<R>,
+        here: usize,
+        length: R,
+        bends: [G; 2],
+        most: R,
+    ) -> Step<R> {
         let zero = R::lit(0.0);
         let table = self.table;
         let from = state.speed_squared;
@@ -291,9 +314,10 @@ impl<R: Lookup> Car<'_, R> {
             let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
             let row = R::pick_row(&table.forces, place);
             let inverse = R::lit(1.0) / length;
-            let [_, lost] = self.shed_and_lost(here, mean, R::lit(0.5) * (bends[0] + bends[1]));
-            let force =
-                rotating * (R::lit(0.5) * (step.end - from) * inverse) + (row[3] + beyond * row[7]) + lost;
+            let level = row[3] + beyond * row[7];
+            let ground = bends[0].half_way(bends[1]);
+            let [drag, _, lost] = self.resistance(here, mean, ground, level);
+            let force = rotating * (R::lit(0.5) * (step.end - from) * inverse) + drag + lost + ground.climb();
             let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
             let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(zero);
             let most = (row[2] + beyond * row[6]) * self.strategy[5];
@@ -308,12 +332,12 @@ impl<R: Lookup> Car<'_, R> {
     /// One segment with its accounts, up to the greatest speed squared at its end. `first` has the results of the first drive for
     /// this segment and the speed squared with which that drive entered it.
     #[inline(always)]
-    fn segment(
+    fn segment<G: Ground<R>>(
         &self,
         state: &mut State<R>,
         root: &mut R,
         here: usize,
-        (length, bends, most): (R, [R; 2], R),
+        (length, bends, most): (R, [G; 2], R),
         first: (Option<[R; 5]>, R),
     ) -> SegmentEnergy<R> {
         let zero = R::lit(0.0);
@@ -339,14 +363,15 @@ impl<R: Lookup> Car<'_, R> {
         let rows = table.forces.len() / 8;
         let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
         let row = R::pick_row(&table.forces, place);
-        let [greatest, motor_most, generator_most, drag]: [R; 4] =
+        let [greatest, motor_most, generator_most, level]: [R; 4] =
             std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
         let inverse = R::lit(1.0) / length;
         let ax = R::lit(0.5) * (end - from) * inverse;
         // The force at the wheels, driving or braking.
         let rotating = R::load(table.rotating);
-        let [opened, lost] = self.shed_and_lost(here, mean, R::lit(0.5) * (bends[0] + bends[1]));
-        let shut = rotating * ax + drag + lost;
+        let ground = bends[0].half_way(bends[1]);
+        let [drag, opened, lost] = self.resistance(here, mean, ground, level);
+        let shut = rotating * ax + drag + lost + ground.climb();
         let open = shut - opened;
         // A driver shuts the flap on the brakes.
         let force = open.max(zero) + shut.min(zero);
@@ -359,7 +384,7 @@ impl<R: Lookup> Car<'_, R> {
                 [motor, (rotating * step.assist - unneeded).max(zero)]
             }
             Mode::Offset => {
-                let open = self.open(bends[0], from) & self.strategy[2].less_than(ax);
+                let open = self.open(bends[0].bend(), from) & self.strategy[2].less_than(ax);
                 let share = zone_share(&self.plan.zones[here], self.strategy);
                 let motor = gated(open, motor_most * self.strategy[5] * share);
                 [motor.min(demand).min(self.reach(left, inverse)), zero]
@@ -449,12 +474,12 @@ impl<R: Lookup> Car<'_, R> {
 
 /// A segment of one lap by itself: the speed squared reached with the motors at a share of their force beside the engine, without a
 /// limit at the end, their force over the mass (m/s^2), and the MGU-H's part of it.
-pub fn motors_step(
+pub fn motors_step<G: Ground<f64>>(
     envelope: &EnvelopeTable<f64>,
     table: &EnergyTable<f64>,
     from: f64,
     length: f64,
-    (bends, drs): ([f64; 2], bool),
+    (bends, drs): ([G; 2], bool),
     share: f64,
 ) -> [f64; 3] {
     let car = Car {
@@ -480,22 +505,21 @@ pub fn motors_step(
     ]
 }
 
-/// Fills `course.speed_squared` with the greatest speeds squared from which all that follows can be braked for.
+/// Fills `speeds` with the greatest speeds squared from which all that follows can be braked for.
 #[inline(always)]
-fn ceilings<R: Lookup>(
+fn ceilings<R: Lookup, G: Grounds<R>>(
     envelope: &EnvelopeTable<R::Storage>,
     closed: bool,
     start: usize,
     entry: R,
-    course: &mut Course<R>,
+    course: &Course<R>,
+    speeds: &mut Vec<R>,
 ) {
     let n = course.curvature.len();
-    let (length, curvature) = (&course.length, &course.curvature);
-    let speeds = &mut course.speed_squared;
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
     let mut next = if closed { start } else { n - 1 };
-    speeds[next] = corner(envelope, curvature[next]);
+    speeds[next] = corner(envelope, G::at(course, next, next));
     // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
     // own values.
     let steps = if closed { 2 * n } else { n - 1 };
@@ -504,15 +528,15 @@ fn ceilings<R: Lookup>(
         let reached = braked(
             envelope,
             speeds[next],
-            length[here],
-            curvature[next],
-            curvature[here],
+            course.length[here],
+            G::at(course, next, here),
+            G::at(course, here, here),
         );
         let again = step + 1 >= n;
         let most = if again {
             speeds[here]
         } else {
-            corner(envelope, curvature[here])
+            corner(envelope, G::at(course, here, here))
         };
         let slower = reached.less_than(most);
         speeds[here] = R::select(slower, reached, most);
@@ -526,7 +550,7 @@ fn ceilings<R: Lookup>(
     }
 }
 
-/// A lap with energy on `course`, whose lengths and curvatures are given; afterwards its speeds squared are those from which the
+/// A lap with energy on `course`, whose lengths, curvatures and relief are given; afterwards its speeds squared are those from which the
 /// car can still brake. `start` is the section where the braking pass begins, as in [`super::super::kernel::lap_time`]; `entry`
 /// is the greatest speed squared at the start of an open line. `strategy` has the figures of the gates, then the share of each
 /// zone. `record` receives every segment of the lap that is accounted.
@@ -539,24 +563,45 @@ pub fn energy_lap<R: Lookup>(
     (closed, start, entry): (bool, usize, R),
     strategy: &[R],
     course: &mut Course<R>,
+    record: impl FnMut(usize, &SegmentEnergy<R>),
+) -> EnergyLap<R> {
+    let tables = (envelope, table, plan);
+    let begin = (closed, start, entry);
+    if course.relief.is_empty() {
+        lap_on::<R, LevelRoad>(tables, begin, strategy, course, record)
+    } else {
+        lap_on::<R, SlopedRoad>(tables, begin, strategy, course, record)
+    }
+}
+
+/// What a lap reads: envelope, energy and zones.
+type Tables<'a, S> = (&'a EnvelopeTable<S>, &'a EnergyTable<S>, &'a EnergyPlan<S>);
+
+/// [`energy_lap`] on one kind of road.
+#[inline(always)]
+fn lap_on<R: Lookup, G: Grounds<R>>(
+    (envelope, table, plan): Tables<'_, R::Storage>,
+    (closed, start, entry): (bool, usize, R),
+    strategy: &[R],
+    course: &mut Course<R>,
     mut record: impl FnMut(usize, &SegmentEnergy<R>),
 ) -> EnergyLap<R> {
-    ceilings(envelope, closed, start, entry, course);
+    let mut most = std::mem::take(&mut course.speed_squared);
+    ceilings::<R, G>(envelope, closed, start, entry, course, &mut most);
     let n = course.curvature.len();
     let zero = R::lit(0.0);
-    let (length, curvature, most) = (&course.length, &course.curvature, &course.speed_squared);
-    let drs = &course.drs;
-    let first_drive = &mut course.first_drive;
+    let mut first_drive = std::mem::take(&mut course.first_drive);
+    let length = &course.length;
     first_drive.clear();
     let mut first_speed_squared = zero;
     let after = |here: usize| if here + 1 < n { here + 1 } else { 0 };
-    let bends = |here: usize| [curvature[here], curvature[after(here)]];
+    let bends = |here: usize| [G::at(course, here, here), G::at(course, after(here), here)];
     let car = Car {
         envelope,
         table,
         plan,
         strategy,
-        drs,
+        drs: &course.drs,
     };
     let fresh = |speed_squared: R| State {
         speed_squared,
@@ -624,6 +669,7 @@ pub fn energy_lap<R: Lookup>(
             }
         }
     }
+    (course.speed_squared, course.first_drive) = (most, first_drive);
     let [time, fuel, deployed, harvested_k, harvested_h, motor_time] = total;
     EnergyLap {
         time,

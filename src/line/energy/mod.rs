@@ -3,6 +3,8 @@
 mod car;
 mod driven;
 mod figures;
+#[cfg(test)]
+mod hill_tests;
 pub mod kernel;
 mod plan;
 mod table;

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-fn car() -> &'static EnergyCar {
+pub(super) fn car() -> &'static EnergyCar {
     static CAR: OnceLock<EnergyCar> = OnceLock::new();
     CAR.get_or_init(|| {
         let car = Car::load("gt_hybrid").unwrap();
@@ -33,7 +33,7 @@ fn bean() -> Vec<DVec2> {
 }
 
 /// The car without its MGU-H.
-fn car_without_h() -> EnergyCar {
+pub(super) fn car_without_h() -> EnergyCar {
     let hybrid = crate::vehicle::Hybrid {
         mgu_h: None,
         ..car().hybrid.clone()
@@ -68,6 +68,7 @@ fn problem_of(car: EnergyCar, mode: Mode) -> HybridProblem {
         points_m,
         closed: true,
         drs: Vec::new(),
+        surface: Vec::new(),
     };
     HybridProblem::new(line, car, plan, strategy, &HybridObjective::ALL, 10.0).unwrap()
 }
@@ -410,6 +411,7 @@ fn an_open_drs_takes_its_share_off_the_drag_that_is_driven_against() {
             points_m: points_m.clone(),
             closed: true,
             drs: drs.to_vec(),
+            surface: Vec::new(),
         };
         let strategy = Strategy::fixed(Gates::OPEN, 1);
         let problem = HybridProblem::new(
@@ -473,6 +475,7 @@ fn the_accounts_of_a_driven_lap_by_hand() {
         station_m,
         speed_mps: speed,
         ax_mps2: 0.0,
+        climb_mps2: 0.0,
         wheels_w,
         drag_n: 1000.0,
     };
@@ -546,6 +549,7 @@ fn the_accounts_of_a_driven_lap_with_the_turbocharger_s_motor() {
         station_m: 10.0,
         speed_mps: speed,
         ax_mps2: 0.0,
+        climb_mps2: 0.0,
         wheels_w: [0.0, (force - rolling) * mass * speed],
         drag_n: 1000.0,
     };

@@ -273,7 +273,7 @@ pub(super) fn summarise(solved: &Solved<'_, Hybrid>) -> HybridSummary {
     let figures = figures.map(|s| ScenarioFigures::of(outcome, &s.own, &s.additional));
     let names = outcome.scenarios.iter().map(|s| s.own.name.clone());
     let scenarios: BTreeMap<String, ScenarioFigures> = names.zip(figures).collect();
-    let mut warnings = Vec::new();
+    let mut warnings = setup.raceline.surface_notes();
     if setup.car.hybrid.store.overflow {
         warnings
             .push("store_overflow: the accounts let the charge pass one, as published ones do".to_owned());
@@ -465,13 +465,14 @@ pub(super) fn write_files(folder: &Path, solved: &Solved<'_, Hybrid>) -> Result<
     Ok(())
 }
 
-/// A lap, segment by segment: place, speed, powers at the wheels, energies, charge, fuel.
+/// A lap, segment by segment: place, speed, powers at the wheels, energies, charge, fuel; on a road that is not level and dry also
+/// height, sine of the gradient and friction.
 fn write_lap(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> {
     let each = |f: fn(&SegmentEnergy<f64>) -> f64| lap.segments.iter().map(f).collect::<Vec<f64>>();
     let power = |f: fn(&SegmentEnergy<f64>) -> f64| power_kw(setup, lap, f);
     let change_j = lap.change_j();
     let soc = change_j[..lap.segments.len()].iter().map(|c| lap.soc(*c));
-    Table::new()
+    let table = Table::new()
         .numbers("station", "m", &lap.station_m)
         .numbers("v", "m/s", each(|s| s.start.sqrt()))
         .numbers("time", "s", each(|s| s.time))
@@ -484,6 +485,15 @@ fn write_lap(path: &Path, setup: &HybridSetup, lap: &ReportedLap) -> Result<()> 
         .numbers("harvested_k", "J", each(|s| s.harvested_k))
         .numbers("harvested_h", "J", each(|s| s.harvested_h))
         .numbers("soc", "-", soc.collect::<Vec<f64>>())
-        .numbers("fuel", "kg", each(|s| s.fuel))
+        .numbers("fuel", "kg", each(|s| s.fuel));
+    if setup.surface.is_empty() {
+        return table.write_csv(path);
+    }
+    let own = setup.surface.iter().take(lap.segments.len());
+    let surface = |k: usize| own.clone().map(|surface| surface[k]).collect::<Vec<f64>>();
+    table
+        .numbers("height", "m", surface(0))
+        .numbers("gradient", "-", &lap.gradient)
+        .numbers("friction", "-", surface(2))
         .write_csv(path)
 }

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::evaluate::energy::HybridProblem;
 use crate::line::energy::{EnergyLap, Gates, Mode, SegmentEnergy};
 use crate::vehicle::hybrid::Store;
+use crate::vehicle::powertrain::GRAVITY_MPS2;
 use serde::{Deserialize, Serialize};
 
 /// A strategy by its gates.
@@ -77,10 +78,12 @@ pub struct ReportedLap {
     pub lap: EnergyLap<f64>,
     /// Every segment.
     pub segments: Vec<SegmentEnergy<f64>>,
-    /// Distance from the start of each segment (m).
+    /// Distance from the start of each segment (m), in the plan view.
     pub station_m: Vec<f64>,
-    /// Length of each segment (m).
+    /// Length of each segment (m), along the slope.
     pub length_m: Vec<f64>,
+    /// Sine of each segment's gradient, positive uphill; empty on a level and dry road.
+    pub gradient: Vec<f64>,
     /// The store, with its charge at the start.
     pub store: Store,
 }
@@ -90,8 +93,14 @@ impl ReportedLap {
     pub fn of(name: &str, problem: &HybridProblem, candidate: &[f64]) -> Self {
         let (lap, segments, course) = problem.lap(candidate);
         let length_m = course.length[..segments.len()].to_vec();
+        let climbs = course.relief.iter().take(segments.len());
+        let gradient: Vec<f64> = climbs.map(|[_, climb, ..]| climb / GRAVITY_MPS2).collect();
+        let level =
+            |(i, h): (usize, &f64)| h * gradient.get(i).map_or(1.0, |sine| (1.0 - sine * sine).sqrt());
         let station_m = length_m
             .iter()
+            .enumerate()
+            .map(level)
             .scan(0.0, |station, h| {
                 let here = *station;
                 *station += h;
@@ -105,6 +114,7 @@ impl ReportedLap {
             segments,
             station_m,
             length_m,
+            gradient,
             store: problem.car().hybrid.store,
         }
     }

@@ -8,9 +8,8 @@ use crate::evaluate::line::LineObjective;
 use crate::line::energy::{EnergyCar, EnergyPlan, GAP_M, Gates, Mode, hybrid_parts, late_bend};
 use crate::line::{FineLine, read_line_apart};
 use crate::study::raceline;
-use crate::track::CrossSections;
-use crate::vehicle::limits::{SpeedRange, car_envelope};
-use crate::vehicle::{Car, Envelope, Traction};
+use crate::track::{CrossSections, Surface};
+use crate::vehicle::{Car, Traction};
 use glam::DVec2;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -43,6 +42,8 @@ pub struct HybridSetup {
     pub closed: bool,
     /// Whether the DRS may be open from each point to the next; nowhere if empty.
     pub drs: Vec<bool>,
+    /// The surface at each point; empty on a level and dry road.
+    pub surface: Vec<Surface>,
     /// The sharpest bend late in the lap.
     pub run_in: usize,
     /// Greatest speed at the start of an open line (m/s).
@@ -75,22 +76,9 @@ pub fn read_inputs(settings: &HybridStudySettings) -> Result<HybridInputs> {
     let read = |path: &PathBuf| read_line_apart(path, settings.spacing_m);
     let given = settings.line.as_ref().map(read).transpose()?;
     let raceline_settings = settings.raceline();
-    let mut raceline = raceline::set_up(&raceline_settings)?;
-    raceline.road.level_only("a lap with energy")?;
-    let (envelope, traction) = match &settings.envelope {
-        Some(path) => {
-            let envelope = Envelope::load(path)?;
-            let traction = Traction::of(&car, &envelope);
-            (envelope, traction)
-        }
-        None => {
-            let limits = car_envelope(&car, &SpeedRange::USUAL)?;
-            let traction = limits.traction();
-            (limits.envelope, traction)
-        }
-    };
-    let car = EnergyCar::new(car, envelope, traction, raceline_settings.ellipse_exponent)?;
-    raceline.car = car.point_mass.clone();
+    let raceline = raceline::set_up(&raceline_settings)?;
+    let traction = Traction::of(&car, &raceline.car.envelope);
+    let car = EnergyCar::of(car, raceline.car.clone(), traction)?;
     if let Some(points) = &given {
         // As it will be driven, so that what is no line is refused before anything is begun.
         let closed = raceline.cross_sections.closed;
@@ -138,9 +126,16 @@ impl HybridInputs {
                 ("fastest".to_owned(), Some(alpha), points)
             }
         };
-        let fine = FineLine::new(&through, closed, settings.spacing_m, None, settings.entry_mps)?;
+        let cross_sections = &raceline.cross_sections;
+        let given = match alpha {
+            Some(_) => cross_sections.relief_of(&through),
+            None => cross_sections.relief_along(&through),
+        };
+        let (spacing_m, entry_mps) = (settings.spacing_m, settings.entry_mps);
+        let fine = FineLine::on(&through, given.as_deref(), closed, spacing_m, None, entry_mps)?;
         Ok(Some(HybridSetup {
-            drs: raceline.cross_sections.drs_along(&fine.points_m),
+            drs: cross_sections.drs_along(&fine.points_m),
+            surface: fine.relief.map_or(Vec::new(), |relief| relief.surface),
             run_in: late_bend(&fine.curvature_1pm),
             length_m: fine.length_m,
             points_m: fine.points_m,
@@ -178,6 +173,7 @@ impl HybridSetup {
             points_m: self.points_m.clone(),
             closed: self.closed,
             drs: self.drs.clone(),
+            surface: self.surface.clone(),
         };
         HybridProblem::new(line, self.car.clone(), plan, strategy, objectives, self.entry_mps)
     }

@@ -45,6 +45,7 @@ impl HybridSetup {
             points_m: &self.points_m,
             closed: self.closed,
             drs: &self.drs,
+            surface: &self.surface,
             run_in: self.run_in,
             entry_mps: self.entry_mps,
         };

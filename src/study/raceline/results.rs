@@ -156,7 +156,7 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
         warnings: bridges(solved.prepared)
             .into_iter()
             .chain(unused_drs(solved.prepared))
-            .chain(surface(solved.prepared))
+            .chain(solved.prepared.surface_notes())
             .chain(warnings(outcome))
             .collect(),
     }
@@ -168,28 +168,6 @@ fn bridges(setup: &Setup) -> Vec<String> {
     crossed
         .map(|[a, b]| format!("the road crosses itself at {a:.0} m and {b:.0} m: taken as a bridge"))
         .collect()
-}
-
-/// What is left out of a road that is not level and dry.
-fn surface(setup: &Setup) -> Vec<String> {
-    let Some(relief) = &setup.road.relief else {
-        return Vec::new();
-    };
-    if relief.is_level() {
-        return Vec::new();
-    }
-    let mut words = vec![
-        "the road has height or banking: laps are those of three dimensions, lengths and curvatures those of the map; steps of the \
-         solver of the fastest line leave out what a line gains by going up or down the banking"
-            .to_owned(),
-    ];
-    if setup.car.envelope.loads().is_empty() {
-        words.push(
-            "the table of limits was not swept under loads: on crests, in dips and on banked road its grip goes with the load"
-                .to_owned(),
-        );
-    }
-    words
 }
 
 /// A word on a DRS that opens nowhere.

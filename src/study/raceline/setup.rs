@@ -120,6 +120,7 @@ pub(super) fn point_mass(car: &Car, envelope: Envelope, settings: &RacelineSetti
     let car = PointMass {
         ellipse_exponent: settings.ellipse_exponent,
         max_steer_rad: Some(car.max_steer_rad),
+        rotating_mass_factor: car.rotating_mass_factor(),
         ..PointMass::new(envelope, wheelbase)
     };
     car.check()?;
@@ -276,6 +277,28 @@ impl Setup {
             (point, room(-leftward, false), room(leftward, true))
         });
         racetrack_csv(rows, relief.as_deref())
+    }
+
+    /// What is left out of a road that is not level and dry, in words.
+    pub(in crate::study) fn surface_notes(&self) -> Vec<String> {
+        let Some(relief) = &self.road.relief else {
+            return Vec::new();
+        };
+        if relief.is_level() {
+            return Vec::new();
+        }
+        let mut words = vec![
+            "the road has height or banking: laps are those of three dimensions, lengths and curvatures those of the map; steps of the \
+             solver of the fastest line leave out what a line gains by going up or down the banking"
+                .to_owned(),
+        ];
+        if self.car.envelope.loads().is_empty() {
+            words.push(
+                "the table of limits was not swept under loads: on crests, in dips and on banked road its grip goes with the load"
+                    .to_owned(),
+            );
+        }
+        words
     }
 
     /// The gear that gives most (from 1) at each speed (m/s), of a car whose limits are its own.

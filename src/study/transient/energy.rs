@@ -11,10 +11,11 @@ use crate::line::energy::{
     DrivenLapEnergy, DrivenMoment, EnergyCar, EnergyLap, EnergyPlan, Gates, Mode, MotorPlan, SegmentEnergy,
     driven_energy, late_bend,
 };
-use crate::line::{FineLine, LapProfile, PointMass, read_columns};
+use crate::line::{FineLine, LapProfile, LineRelief, PointMass, read_columns};
 use crate::report::{LapLine, LapView, Table};
 use crate::study::hybrid::ReportedLap;
 use crate::vehicle::aero::aero_forces;
+use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::wheels::Moment;
 use crate::vehicle::{Car, Traction};
 use serde::{Deserialize, Serialize};
@@ -34,8 +35,7 @@ impl Motor {
     /// Reads the lap that the settings name; nothing if they name none. The first of the lines is the one that it is of.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is no lap of the study `hybrid` or of another line, for a car without a hybrid drive, and for a road in
-    /// three dimensions.
+    /// [`Error::Input`] for a file that is no lap of the study `hybrid` or of another line, and for a car without a hybrid drive.
     pub(super) fn read(
         settings: &TransientSettings,
         car: &Car,
@@ -45,17 +45,11 @@ impl Motor {
         let (Some(path), Some(line)) = (&settings.deployment, lines.first()) else {
             return Ok(None);
         };
-        line.circuit.level_only("a lap with energy")?;
         let expected = "a lap of the study hybrid: columns station, v, time, motor_power and soc";
         let rows = read_columns(path, ["station", "v", "time", "motor_power", "soc"], expected)?;
         let own = |car: &Car| {
             let traction = Traction::of(car, &limits.envelope);
-            EnergyCar::new(
-                car.clone(),
-                limits.envelope.clone(),
-                traction,
-                limits.ellipse_exponent,
-            )
+            EnergyCar::of(car.clone(), limits.clone(), traction)
         };
         let energy = own(car)?;
         let mut charged = car.clone();
@@ -104,12 +98,7 @@ impl Motor {
         fine: &FineLine,
         drs: &[bool],
     ) -> Result<Ideal> {
-        let car = EnergyCar::new(
-            self.car.car.clone(),
-            limits.envelope.clone(),
-            traction,
-            limits.ellipse_exponent,
-        )?;
+        let car = EnergyCar::of(self.car.car.clone(), limits.clone(), traction)?;
         let n = fine.points_m.len();
         let ends = fine.station_m.iter().zip(&fine.segment_m);
         let shares = ends.map(|(start, h)| self.plan.mean(*start, start + h)).collect();
@@ -126,6 +115,10 @@ impl Motor {
             points_m: fine.points_m.clone(),
             closed: true,
             drs: fine.drs_of(drs),
+            surface: fine
+                .relief
+                .as_ref()
+                .map_or(Vec::new(), |relief| relief.surface.clone()),
         };
         let plan = EnergyPlan::single(n, late_bend(&fine.curvature_1pm), self.mode);
         let problem = HybridProblem::new(line, car, plan, strategy, &[HybridObjective::LapTime], 0.0)?;
@@ -166,7 +159,7 @@ impl Ideal {
         let lap = LapProfile::of_speeds(
             &self.car.point_mass,
             shape,
-            None,
+            fine.relief.as_ref(),
             &speed_squared,
             self.lap.lap.time,
             Vec::new(),
@@ -181,8 +174,16 @@ impl Ideal {
         self.plan.at(station_m) * most * self.car.table.mass * self.car.car.chassis.radius_rear
     }
 
-    /// The accounts of the lap that was driven on a line of this length (m).
-    pub(super) fn accounts(&self, drive: &Drive, moments: &[Moment], length_m: f64) -> DrivenLapEnergy {
+    /// The accounts of the lap that was driven on a line.
+    pub(super) fn accounts(&self, drive: &Drive, moments: &[Moment], line: &FineLine) -> DrivenLapEnergy {
+        let length_m = line.length_m;
+        let climb_mps2 = |station_m: f64| {
+            let after = line.station_m.partition_point(|s| *s <= station_m);
+            let sine = |relief: &LineRelief| relief.gradient[after.saturating_sub(1)];
+            line.relief
+                .as_ref()
+                .map_or(0.0, |relief| GRAVITY_MPS2 * sine(relief))
+        };
         let chassis = &self.car.car.chassis;
         let radii = [chassis.radius_front, chassis.radius_rear];
         let samples = drive.states.len();
@@ -193,7 +194,9 @@ impl Ideal {
                 time_s,
                 station_m,
                 speed_mps: drive.states[i][0],
-                ax_mps2: moments[i].ax_mps2,
+                // A sensor on the car reads gravity, too.
+                ax_mps2: moments[i].ax_mps2 - climb_mps2(station_m),
+                climb_mps2: climb_mps2(station_m),
                 wheels_w: [power(0) + power(1), power(2) + power(3)],
                 drag_n: aero_forces(chassis, drive.states[i][0], drive.inputs[i].flap).drag,
             }

@@ -225,7 +225,7 @@ pub(super) fn report(
 /// The accounts of a hybrid's lap; nothing of another car's.
 fn accounts(outcome: &DrivenLine, moments: &[Moment]) -> Option<DrivenLapEnergy> {
     let ideal = outcome.ideal.as_ref()?;
-    Some(ideal.accounts(&outcome.drive, moments, outcome.line.length_m))
+    Some(ideal.accounts(&outcome.drive, moments, &outcome.point_mass))
 }
 
 /// The figures of the accounts of a hybrid's lap.

@@ -1,24 +1,62 @@
 //! What each point of a set alone dominates.
 
-use super::hypervolume::hypervolume;
+use super::hypervolume::{Point, bites, hypervolume, point, volume};
 use crate::error::Result;
 use crate::evaluate::simd::{InstructionSet, LaneWork, dispatch};
 use crate::scalar::lanes::Lanes;
 use serde::{Deserialize, Serialize};
 
-/// The volume, up to `reference`, that each of `points` dominates and no other does, for one to three
-/// objectives. Zero for a point that another equals or dominates, or that is not better than the reference.
+/// The volume, up to `reference`, that each of `points` dominates and no other does. Zero for a point that another equals or
+/// dominates, or that is not better than the reference.
 ///
 /// # Errors
 /// As [`hypervolume`].
 pub fn contributions(points: &[Vec<f64>], reference: &[f64]) -> Result<Vec<f64>> {
     // It checks the widths.
     hypervolume(points, reference)?;
+    if reference.len() > COLUMNS {
+        let shares = (0..points.len()).map(|i| exclusive_of(points, i, reference));
+        return Ok(shares.collect());
+    }
     let mut columns = Columns::default();
     points.iter().for_each(|row| columns.push(row));
     Ok((0..points.len())
         .map(|i| columns.exclusive(i, reference).0)
         .collect())
+}
+
+/// Objectives up to which [`Columns`] hold points.
+pub(in crate::swarm) const COLUMNS: usize = 3;
+
+/// The volume that point `i` alone dominates, in any number of objectives: its box less what the others bite off.
+pub(in crate::swarm) fn exclusive_of(points: &[Vec<f64>], i: usize, reference: &[f64]) -> f64 {
+    let better = |corner: &Point| corner.iter().zip(reference).all(|(x, end)| x < end);
+    let own = point(&points[i]);
+    if !better(&own) {
+        return 0.0;
+    }
+    let others: Vec<Point> = points.iter().map(|row| point(row)).collect();
+    let others = others.iter().enumerate().filter(|(j, _)| *j != i);
+    let mut bitten = bites(&own, others.map(|(_, other)| other), reference.len());
+    if bitten.contains(&own) {
+        return 0.0;
+    }
+    bitten.retain(better);
+    let whole: f64 = own.iter().zip(reference).map(|(x, end)| end - x).product();
+    (whole - volume(&mut bitten, reference)).max(0.0)
+}
+
+/// [`Columns::touches`] in any number of objectives.
+pub(in crate::swarm) fn touches_of(
+    points: &[Vec<f64>],
+    change: &[f64],
+    came: Option<usize>,
+    i: usize,
+    reference: &[f64],
+) -> bool {
+    let corner: Vec<f64> = points[i].iter().zip(change).map(|(a, b)| a.max(*b)).collect();
+    let hides = |j: usize| j != i && Some(j) != came && points[j].iter().zip(&corner).all(|(x, c)| x <= c);
+    corner.iter().zip(reference).all(|(x, end)| x < end) && !(0..points.len()).any(hides)
 }
 
 /// Points of up to three objectives by objective; missing ones are zero, against a reference of one.
@@ -285,7 +323,7 @@ mod tests {
     fn is_the_difference() {
         let random = Random::new(5);
         for case in 0..400 {
-            let width = 1 + case as usize % 3;
+            let width = 1 + case as usize % 5;
             let count = 1 + random.below(14, 1, case, 0, 0);
             let points: Vec<Vec<f64>> = (0..count as u32)
                 .map(|i| {
@@ -302,6 +340,9 @@ mod tests {
                 rest.remove(i);
                 let difference = whole - hypervolume(&rest, &reference).unwrap();
                 assert_eq!(found[i], difference, "{i} of {points:?}");
+                if width > COLUMNS {
+                    continue;
+                }
                 let columns = |points: &[Vec<f64>]| {
                     let mut columns = Columns::default();
                     points.iter().for_each(|row| columns.push(row));
@@ -326,15 +367,24 @@ mod tests {
             columns
         };
         for case in 0..400 {
-            let width = 1 + case as usize % 3;
+            let width = 1 + case as usize % 5;
             let count = 2 + random.below(14, 1, case, 0, 0);
             let draw = |i: u32, k: u32| random.below(10, 2, case, i, k) as f64 / 8.0 - 0.25;
             let row = |i: u32| (0..width as u32).map(|k| draw(i, k)).collect();
             let points: Vec<Vec<f64>> = (0..count as u32).map(row).collect();
             let reference = vec![0.875; width];
             let (last, rest) = points.split_last().unwrap();
+            for i in (0..rest.len()).filter(|_| width > COLUMNS) {
+                let share = |points: &[Vec<f64>]| exclusive_of(points, i, &reference);
+                let changes = share(&points) != share(rest);
+                assert_eq!(
+                    touches_of(&points, last, Some(rest.len()), i, &reference),
+                    changes
+                );
+                assert_eq!(touches_of(rest, last, None, i, &reference), changes);
+            }
             let (with, without) = (columns(&points), columns(rest));
-            for i in 0..rest.len() {
+            for i in (0..rest.len()).filter(|_| width <= COLUMNS) {
                 let share = |columns: &Columns| columns.exclusive(i, &reference).0;
                 let changes = share(&with) != share(&without);
                 assert_eq!(with.touches(last, Some(rest.len()), i, &reference), changes);

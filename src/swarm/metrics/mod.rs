@@ -16,6 +16,7 @@
 //! 5. Kung, Luccio, Preparata, *On finding the maxima of a set of vectors*, J. ACM 22 (1975).
 //! 6. Zhang, Tian, Cheng, Jin, *An efficient approach to nondominated sorting for evolutionary multiobjective
 //!    optimization*, IEEE TEC 19 (2015) (fronts by bisection).
+//! 7. While, Bradstreet, Barone, *A fast way of calculating exact hypervolumes*, IEEE TEC 16 (2012) (four objectives and more).
 
 mod contribution;
 mod hypervolume;
@@ -25,8 +26,8 @@ mod ranks;
 mod significance;
 mod staircase;
 
-pub(super) use contribution::Columns;
 pub use contribution::contributions;
+pub(super) use contribution::{COLUMNS, Columns, exclusive_of, touches_of};
 pub use hypervolume::hypervolume;
 pub use indicators::{Scale, epsilon, igd_plus, nearest_to_ideal, spread};
 pub(super) use non_dominated::dominates;

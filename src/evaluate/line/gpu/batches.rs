@@ -43,8 +43,10 @@ pub struct LineStretch {
     pub lock_radius: f32,
     /// Gravity, m/s^2.
     pub gravity: f32,
+    /// The share of the mass that is accelerated which rotates.
+    pub coasting: f32,
     /// Not used.
-    pub spare: [u32; 2],
+    pub spare: u32,
 }
 
 impl LineStretch {
@@ -65,7 +67,8 @@ impl LineStretch {
             load_most: envelope.loads.most,
             lock_radius: envelope.loads.lock_radius,
             gravity: GRAVITY_MPS2 as f32,
-            spare: [0; 2],
+            coasting: envelope.loads.coasting,
+            spare: 0,
         }
     }
 }
