@@ -26,10 +26,10 @@ pub(super) fn load_mps2(c: &Chassis<f64>, speed: f64) -> f64 {
     c.gravity + (aero.downforce_front + aero.downforce_rear) / c.mass
 }
 
-/// Estimates of what the car can do at a speed: lateral and longitudinal grip, drive and drag, all in m/s^2.
 /// A row of the road, see [`row_of`].
 type Row = [f64; RELIEF_WIDTH];
 
+/// Estimates of what the car can do at a speed: lateral and longitudinal grip, drive and drag, all in m/s^2.
 struct TyreEnvelope<'a> {
     car: &'a Car,
     friction: f64,

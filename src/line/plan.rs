@@ -184,6 +184,12 @@ impl LinePlan<f64> {
 }
 
 impl<S> LinePlan<S> {
+    /// Figures that a candidate has of each section on a device: length, curvature and speed squared; on a road that is not level and
+    /// dry six more.
+    pub fn figures_each(&self) -> usize {
+        if self.relief.is_empty() { 3 } else { 9 }
+    }
+
     /// Number of segments: one per section, but for the last of an open line.
     pub fn segments(&self) -> usize {
         self.rows.len() - usize::from(!self.closed)

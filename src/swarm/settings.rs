@@ -209,8 +209,8 @@ pub enum Leaders {
 pub enum Truncation {
     /// The least crowding distance \[5\].
     Crowding,
-    /// The least volume that a member alone dominates \[8\]; with a reference for up to five objectives,
-    /// without one for up to four, or three with more than 200 members; as `MutualNearest` beyond.
+    /// The least volume that a member alone dominates \[8\]. With a reference this is for up to five objectives. Without one it is
+    /// for up to four, and for up to three in an archive of more than 200 members. Beyond, it is `MutualNearest`.
     Contribution,
     /// The least distance to the nearest neighbour, then to the next \[9\].
     MutualNearest,

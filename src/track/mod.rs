@@ -40,6 +40,8 @@ pub use spline::Deviation;
 pub use survey::{Survey, SurveyOptions};
 
 #[cfg(test)]
+mod relief_tests;
+#[cfg(test)]
 mod road_tests;
 #[cfg(test)]
 mod tests;

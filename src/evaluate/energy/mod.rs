@@ -28,11 +28,11 @@ impl ProblemKind for HybridProblem {
         &self.problem
     }
 
-    /// The figures of the kernels in both precisions and on a device, three figures of each cross-section there, the place, the
+    /// The figures of the kernels in both precisions and on a device, those of each cross-section there, the place, the
     /// lap and the row.
     fn bytes_each(&self) -> u64 {
         let figures = self.line_variables() + self.strategy_figures();
-        16 * figures as u64 + 12 * self.plan().rows.len() as u64 + 512
+        16 * figures as u64 + 4 * (self.plan().figures_each() * self.plan().rows.len()) as u64 + 512
     }
 
     /// A figure of the kernels may be too large where the variable behind it is not: the figure is in joules, say, and the

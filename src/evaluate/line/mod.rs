@@ -28,10 +28,10 @@ impl ProblemKind for LineProblem {
         &self.problem
     }
 
-    /// The variables in single precision, once here and once on a device, three figures of each cross-section there, the place,
+    /// The variables in single precision, once here and once on a device, those of each cross-section there, the place,
     /// the measures and the row.
     fn bytes_each(&self) -> u64 {
-        8 * self.dimensions() as u64 + 12 * self.plan().rows.len() as u64 + 320
+        8 * self.dimensions() as u64 + 4 * (self.plan().figures_each() * self.plan().rows.len()) as u64 + 320
     }
 
     fn preliminary_failure(&self, candidate: &[f64]) -> Option<Failure> {

@@ -28,7 +28,8 @@ pub fn contributions(points: &[Vec<f64>], reference: &[f64]) -> Result<Vec<f64>>
 /// Objectives up to which [`Columns`] hold points.
 pub(in crate::swarm) const COLUMNS: usize = 3;
 
-/// The volume that point `i` alone dominates, in any number of objectives: its box less what the others bite off.
+/// The volume that point `i` alone dominates, where there are more objectives than [`Columns`] hold: its box less what the others bite
+/// off.
 pub(in crate::swarm) fn exclusive_of(points: &[Vec<f64>], i: usize, reference: &[f64]) -> f64 {
     let better = |corner: &Point| corner.iter().zip(reference).all(|(x, end)| x < end);
     let own = point(&points[i]);
@@ -46,7 +47,7 @@ pub(in crate::swarm) fn exclusive_of(points: &[Vec<f64>], i: usize, reference: &
     (whole - volume(&mut bitten, reference)).max(0.0)
 }
 
-/// [`Columns::touches`] in any number of objectives.
+/// [`Columns::touches`], where there are more objectives.
 pub(in crate::swarm) fn touches_of(
     points: &[Vec<f64>],
     change: &[f64],

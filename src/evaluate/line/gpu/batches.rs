@@ -88,7 +88,8 @@ pub(in crate::evaluate) struct LineKernel<'k> {
     pub lap: bool,
 }
 
-/// Floats per candidate and section in the course: length and curvature, and on a road that is not level and dry six more, the last of them spare.
+/// Floats per candidate and section in the course: length and curvature, and on a road that is not level and dry six more, the last of
+/// them spare.
 const COURSE_WIDTH: usize = 2;
 const RELIEF_WIDTH: usize = 8;
 /// Sections of all lines of the first dispatch: tens of milliseconds on a software driver.
