@@ -1,6 +1,6 @@
 #!/bin/sh
-# What a GPU makes of lapswarm, in eight minutes: devices, parity, tuning (remembered for this adapter), rates against population, whole generations from 1e3 to 1e6
-# particles, and a study of each kind. Writes one JSON and one Markdown file into a folder, for
+# What a GPU makes of lapswarm, in five minutes: devices, parity, tuning (remembered for this adapter), rates against population,
+# whole generations from 1e3 to 1e6 particles, and a study of each kind. Writes one JSON and one Markdown file into a folder, for
 # `benches/results/`.
 #
 #   benches/gpu.sh FOLDER [ADAPTER]           on the GPU whose name has ADAPTER in it, else on the first
@@ -18,7 +18,7 @@ fi
 if [ -n "${SMALL:-}" ]; then
     populations=256,1024 whole=256,1024 longest=2 particles=64 iterations=10 tuned=1024
 else
-    populations=1000,10000,100000,1000000 whole=1000,10000,100000,1000000 longest=10 particles=16384 iterations=50 tuned=1048576
+    populations=1000,10000,100000,1000000 whole=1000,10000,100000,1000000 longest=4 particles=16384 iterations=50 tuned=1048576
 fi
 mkdir -p "$folder" && cd "$folder" || exit 1
 if [ -e gpu.json ]; then
@@ -57,7 +57,7 @@ on() { # NAME SECONDS ARGUMENTS...: the same on the GPU alone
 step devices 30 devices --json
 "$LAPSWARM" devices >"$work/devices.txt" 2>/dev/null
 on parity 120 parity
-step tuning 150 bench tune ${adapter:+--adapter "$adapter"} --population "$tuned" --longest-s 0.2 --json
+step tuning 120 bench tune ${adapter:+--adapter "$adapter"} --population "$tuned" --longest-s 0.05 --json
 on rates 120 bench --problems replay,line,energy,drive,steady --populations "$populations" --longest-s "$longest"
 on generations 120 bench whole --populations "$whole" --longest-s "$longest"
 on identify 60 identify --section Abbey --population "$particles" --iterations "$iterations" --no-polish --out "$work/identify"

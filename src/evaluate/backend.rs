@@ -1,6 +1,7 @@
 //! Choice of backend.
 
 use super::BackendInfo;
+use super::by_size::by_size;
 use super::gpu;
 use super::simd::InstructionSet;
 use crate::error::{Error, Result};
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Where evaluations run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BackendChoice {
-    /// A real GPU if there is one, else lanes on the processor.
+    /// A real GPU if there is one, for populations of 512 candidates and more; else lanes on the processor.
     #[default]
     Auto,
     /// The `f64` reference.
@@ -48,6 +49,7 @@ impl BackendChoice {
         let lanes = || BackendInfo::of_lanes(InstructionSet::best());
         match self.decided(adapter) {
             Self::Gpu => match gpu::would_be(adapter) {
+                Ok(info) if self == Self::Auto && adapter.is_none() => Ok(by_size(info, &lanes())),
                 Ok(info) => Ok(info),
                 // Like evaluators: lanes take over if no GPU was asked for, and from a GPU that fails.
                 Err(Error::NoDevice(_)) if self == Self::Auto && adapter.is_none() => Ok(lanes()),

@@ -4,6 +4,7 @@
 //! it. Optimisers see nothing else, so they run any problem on any backend.
 
 mod backend;
+mod by_size;
 mod dispatches;
 #[cfg(feature = "vehicle")]
 pub mod drive;

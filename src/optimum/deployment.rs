@@ -16,6 +16,7 @@ use crate::line::ground::{Grounds, LevelRoad, SlopedRoad};
 use crate::line::kernel::{Course, may_open};
 use crate::track::Surface;
 use glam::DVec2;
+use rayon::prelude::*;
 use std::time::Instant;
 
 /// The best deployment of an energy.
@@ -165,6 +166,7 @@ impl DeploymentSearch<'_> {
             }
             let squares: Vec<f64> = segments.iter().map(|s| s.start).collect();
             let linear: Vec<Linear> = (0..segments.len())
+                .into_par_iter()
                 .map(|i| self.linear(&course, i, squares[i], shares[i]))
                 .collect();
             let program = Program {
@@ -293,9 +295,11 @@ impl DeploymentSearch<'_> {
         let all_of_it = counted_on_j > (1.0 - SPENT) * energy_j;
         let (mut shares, mut scale) = (shares.to_vec(), 1.0);
         for _ in 0..ROUNDS {
-            for (i, Asked { square, motor, .. }) in asked.iter().enumerate() {
-                shares[i] = self.share(course, i, *square, scale * motor);
-            }
+            shares.par_iter_mut().zip(asked).enumerate().for_each(
+                |(i, (share, Asked { square, motor, .. }))| {
+                    *share = self.share(course, i, *square, scale * motor);
+                },
+            );
             let spent = unbound.lap(&shares).0.deployed / energy_j;
             if (spent - 1.0).abs() < SPENT || spent < 1.0 && !all_of_it {
                 break;

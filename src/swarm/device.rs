@@ -140,12 +140,12 @@ impl DeviceMopso {
         let d = space.dimensions();
         let bindings = [Uniform, Read, Write, Write, Write, Write, Write, Write];
         let source = swarm();
-        let kernel = |entry: &str| context.own_kernel(&source, entry, &bindings);
+        let kernel = |entry: &str| context.kernel(&source, entry, &bindings);
         let scatter = kernel("scatter")?;
         let kernels = Kernels {
             learn: kernel("learn")?,
             advance: kernel("advance")?,
-            gather: context.own_kernel(&swarm_gather(), "gather", &[Uniform, Read, Read, Write])?,
+            gather: context.kernel(&swarm_gather(), "gather", &[Uniform, Read, Read, Write])?,
         };
         let n = settings.motion.population;
         let lanes = n.next_multiple_of(BLOCK) as u64;

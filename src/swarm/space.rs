@@ -1,7 +1,9 @@
 //! The cube that swarms move in.
 
 use crate::error::{Error, Result};
+use crate::evaluate::resident::BLOCK;
 use crate::evaluate::{Problem, Variable};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -93,13 +95,17 @@ impl Space {
     /// `count` positions, row-major, as candidates in the variables' units.
     pub fn scaled(&self, positions: &[f64], count: usize) -> Vec<f64> {
         let d = self.dimensions();
-        let fixed = self.variables.iter().map(|v| v.lower);
-        let mut candidates: Vec<f64> = (0..count).flat_map(|_| fixed.clone()).collect();
-        for (row, candidate) in candidates.chunks_exact_mut(self.variables.len()).enumerate() {
-            for (j, &k) in self.free.iter().enumerate() {
-                candidate[k] = self.variables[k].at(positions[row * d + j]);
-            }
-        }
+        let fixed: Vec<f64> = self.variables.iter().map(|v| v.lower).collect();
+        let mut candidates = fixed.repeat(count);
+        candidates
+            .par_chunks_exact_mut(self.variables.len())
+            .with_min_len(BLOCK)
+            .enumerate()
+            .for_each(|(row, candidate)| {
+                for (j, &k) in self.free.iter().enumerate() {
+                    candidate[k] = self.variables[k].at(positions[row * d + j]);
+                }
+            });
         candidates
     }
 

@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
 use nalgebra::DVector;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`WindowSwarm`].
@@ -203,7 +204,7 @@ impl WindowSwarm {
     fn sample(&mut self) {
         let (turn, when) = (self.turn(), self.counters.iteration as u32);
         let (random, count) = (self.random, self.settings.population);
-        for (w, window) in self.turns[turn].iter_mut().enumerate() {
+        let sample = |(w, window): (usize, &mut Window)| {
             let draw = |particle: usize| {
                 let who = (w * count + particle) as u32;
                 window
@@ -211,15 +212,14 @@ impl WindowSwarm {
                     .sample(|k| random.normal(SAMPLE, when, who, k as u32))
             };
             window.heights = (0..count).map(draw).collect();
-        }
+        };
+        self.turns[turn].par_iter_mut().enumerate().for_each(sample);
     }
 
-    /// The row of one particle: the context but for its window.
-    fn row(&self, window: &Window, heights: &DVector<f64>) -> Vec<f64> {
-        let mut row = self.context.clone();
-        window.add(heights, &mut row);
-        self.hold(&mut row);
-        row
+    /// Makes the context the row of one particle, by its window.
+    fn place(&self, window: &Window, heights: &DVector<f64>, row: &mut [f64]) {
+        window.add(heights, row);
+        self.hold(row);
     }
 
     fn hold(&self, row: &mut [f64]) {
@@ -288,13 +288,18 @@ fn bump(middle: usize, stride: usize, n: usize, cyclic: bool) -> Vec<(usize, f64
 
 impl Optimiser for WindowSwarm {
     fn ask(&mut self) -> Vec<f64> {
+        let (windows, count) = (&self.turns[self.turn()], self.settings.population);
         // The context comes first.
-        let mut rows = self.context.clone();
-        for window in &self.turns[self.turn()] {
-            for heights in &window.heights {
-                rows.extend(self.row(window, heights));
-            }
-        }
+        let mut rows = self.context.repeat(1 + count * windows.len());
+        let n = self.context.len();
+        rows[n..]
+            .par_chunks_exact_mut(count * n)
+            .zip(windows)
+            .for_each(|(rows, window)| {
+                for (row, heights) in rows.chunks_exact_mut(n).zip(&window.heights) {
+                    self.place(window, heights, row);
+                }
+            });
         rows
     }
 
@@ -310,22 +315,36 @@ impl Optimiser for WindowSwarm {
         let least = (0..worths.len()).min_by(|&a, &b| worths[a].order(&worths[b]));
         if let Some(i) = least.filter(|&i| worths[i] < self.best.1) {
             let window = &self.turns[turn][i / count];
-            self.best = (self.row(window, &window.heights[i % count]), worths[i]);
+            let mut row = self.context.clone();
+            self.place(window, &window.heights[i % count], &mut row);
+            self.best = (row, worths[i]);
         }
-        let mut context = std::mem::take(&mut self.context);
-        for (window, worths) in self.turns[turn].iter_mut().zip(worths.chunks_exact(count)) {
+        let learn = |(window, worths): (&mut Window, &[Worth])| {
             let mut order: Vec<usize> = (0..count).collect();
             order.sort_by(|&a, &b| worths[a].order(&worths[b]));
             // A window that failed as a whole, or to which nothing matters, says nothing about where to go.
             let (best, worst) = (worths[order[0]], worths[order[count - 1]]);
             if !best.succeeded() || best == worst {
-                continue;
+                return None;
             }
             let ranked: Vec<&DVector<f64>> = order.iter().map(|&i| &window.heights[i]).collect();
             window.distribution.adapt(&ranked, true);
             let d = window.bumps.len();
-            let moved = std::mem::replace(&mut window.distribution.mean, DVector::zeros(d));
-            window.add(&moved, &mut context);
+            Some(std::mem::replace(
+                &mut window.distribution.mean,
+                DVector::zeros(d),
+            ))
+        };
+        let moves: Vec<Option<DVector<f64>>> = self.turns[turn]
+            .par_iter_mut()
+            .zip(worths.par_chunks_exact(count))
+            .map(learn)
+            .collect();
+        let mut context = std::mem::take(&mut self.context);
+        for (window, moved) in self.turns[turn].iter().zip(&moves) {
+            if let Some(moved) = moved {
+                window.add(moved, &mut context);
+            }
         }
         self.hold(&mut context);
         self.context = context;

@@ -166,8 +166,8 @@ fn long_windows_are_driven_in_chunks_that_do_not_show() {
     }
 }
 
-/// A software driver leaves all loops of a dispatch after 65,535 rounds without a word: however fast the device, no dispatch
-/// may take as many.
+/// A software driver leaves all loops of a dispatch after 65,535 rounds without a word: however fast it is, no dispatch may take as
+/// many. A graphics processor takes the whole lap in one.
 fn windows_longer_than_a_driver_bears_are_driven_to_their_end() {
     let context = the_device();
     for substeps in [1, 3] {
@@ -187,7 +187,10 @@ fn windows_longer_than_a_driver_bears_are_driven_to_their_end() {
         evaluator.evaluate(&population).expect("it runs");
         // As fast as can be, from what the first evaluation taught.
         let found = evaluator.evaluate(&population).expect("it runs");
-        assert!(evaluator.statistics().dispatches > 1);
+        assert_eq!(
+            evaluator.statistics().dispatches > 1,
+            !context.summary().kind.is_real()
+        );
         evaluator = evaluator.with_batching(Batching {
             steps: Some(64),
             ..unhurried

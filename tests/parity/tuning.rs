@@ -10,15 +10,15 @@ tests! {
     what_is_tuned_is_remembered_for_the_adapter_and_damaged_files_are_as_good_as_none: device,
 }
 
-/// Workgroups, trusted modules and lanes of a dispatch, whatever `bench tune` may choose.
+/// Workgroups and lanes of a dispatch, whatever `bench tune` may choose.
 fn no_tuning_changes_a_bit() {
     let _turn = alone();
     let usual = GpuContext::shared(None).expect("it opens");
     let problems = Problems::new();
     let kind = usual.summary().kind;
-    // Each workgroup, with its other loops or its other lanes by turns.
-    let tried: Vec<Tuning> = Tuning::all(kind).into_iter().step_by(3).collect();
-    assert!(tried.iter().any(|t| !t.bounded_loops) && tried.iter().any(|t| t.workgroup == 256));
+    // Each workgroup, with the usual lanes or more by turns.
+    let tried: Vec<Tuning> = Tuning::all(kind).into_iter().step_by(2).collect();
+    assert!(tried.iter().any(|t| t.workgroup == 256));
     for problem in problems.kinds() {
         let population = problem.population(300, 1);
         let on = |context| {
@@ -29,7 +29,7 @@ fn no_tuning_changes_a_bit() {
         for &tuning in &tried {
             let tuned = GpuContext::with_tuning(None, tuning).expect("it opens");
             assert_eq!(tuned.tuning(), tuning);
-            assert_eq!(on(tuned), expected, "{}, {tuning:?}", problem.name);
+            assert!(on(tuned) == expected, "{}, {tuning:?}", problem.name);
         }
     }
 }
@@ -59,7 +59,7 @@ fn what_is_tuned_is_remembered_for_the_adapter_and_damaged_files_are_as_good_as_
     };
     let table = run(&["bench", "tune", "--problems", "line", "--population", "64"]);
     let rows = table["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 16);
+    assert_eq!(rows.len(), 8);
     assert!(rows.iter().all(|row| row["same_bits"] == true), "{table}");
     let file = PathBuf::from(table["best"]["file"].as_str().unwrap());
     let text = std::fs::read_to_string(&file).unwrap();

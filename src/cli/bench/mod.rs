@@ -35,7 +35,7 @@ enum What {
     Swarm(swarm::Arguments),
     /// Measure whole generations (ask, evaluate, tell) of every problem, and what of them is not kernels.
     Whole(whole::Arguments),
-    /// Try how kernels are best compiled and dispatched on a GPU, and remember it.
+    /// Try how kernels are best dispatched on a GPU, and remember it.
     Tune(tune::Arguments),
 }
 

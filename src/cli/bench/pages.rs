@@ -272,15 +272,14 @@ pub fn of_whole(folder: &Path, rows: &[whole::Row]) -> Result<HtmlReport> {
 
 /// The page of `bench tune`.
 pub fn of_tune(folder: &Path, rows: &[tune::Row], best: String) -> Result<HtmlReport> {
-    let mut page = HtmlReport::new("bench", "How kernels are best compiled and dispatched");
+    let mut page = HtmlReport::new("bench", "How kernels are best dispatched");
     page.sentence(best);
     let table = Table::rows(rows)
         .text("problem", |r| r.problem)
         .number("workgroup", "lanes", |r| f64::from(r.workgroup))
-        .text("loops", |r| if r.bounded_loops { "bounded" } else { "trusted" })
         .number("lanes of a dispatch", "", |r| r.lanes as f64)
         .number("particles", "", |r| r.population as f64)
-        .number("evaluation", "ms", |r| r.evaluation_ms)
+        .number("kernels", "ms", |r| r.kernel_ms)
         .number("times usual", "", |r| r.times_usual)
         .text("bits", |r| if r.same_bits { "same" } else { "others" });
     rows_of(&mut page, folder, &table.table())?;

@@ -8,7 +8,7 @@ use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::config::read_text;
 use lapswarm::evaluate::drive::DriveProblem;
-use lapswarm::evaluate::energy::{HybridObjective, HybridProblem};
+use lapswarm::evaluate::energy::{Free, HybridObjective, HybridProblem, Strategy};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
 use lapswarm::evaluate::replay::ReplayProblem;
@@ -16,7 +16,7 @@ use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::steady::{SteadyObjective, SteadyProblem};
 use lapswarm::evaluate::{BackendChoice, CpuBackend, Evaluator, GpuBackend, OnDevice, Problem, SimdBackend};
 use lapswarm::line::Parametrisation;
-use lapswarm::line::energy::Mode;
+use lapswarm::line::energy::{Gates, Mode};
 use lapswarm::parity;
 use lapswarm::random::Random;
 use lapswarm::report::Figure;
@@ -108,6 +108,8 @@ const CANDIDATES: u32 = 0xbe0c;
 const SPREAD: f64 = 0.02;
 /// Cross-sections of the circuit that lines are driven on, and that energy is deployed on.
 const SECTIONS: usize = 360;
+/// Energy that fronts may deploy in a lap, MJ.
+const DEPLOYED_MJ: f64 = 4.0;
 
 /// A problem with what is known of its arithmetic.
 pub(super) struct Case<K> {
@@ -234,7 +236,18 @@ pub(super) fn energy(front: bool) -> Result<Case<HybridProblem>> {
     let mut problems = parity::energy::problems(SECTIONS, &[Mode::Additional], false, false)?;
     let mut hybrid = problems.remove(0);
     if front {
-        hybrid = hybrid.by(&HybridObjective::ALL[..3])?;
+        // As the study searches for a front: shares of zones, without gates.
+        let zones = hybrid.energy().count();
+        let strategy = Strategy {
+            free: (0..zones).map(Free::Zone).collect(),
+            ..Strategy::fixed(Gates::of_zones(DEPLOYED_MJ), zones)
+        };
+        let (line, car, plan) = (
+            hybrid.line().clone(),
+            hybrid.car().clone(),
+            hybrid.energy().clone(),
+        );
+        hybrid = HybridProblem::new(line, car, plan, strategy, &HybridObjective::ALL[..3], 30.0)?;
     }
     let middle = middle(&hybrid.problem);
     Ok(Case {

@@ -1,4 +1,4 @@
-//! `lapswarm bench tune`: how kernels are best compiled and dispatched on the adapter at hand.
+//! `lapswarm bench tune`: how kernels are best dispatched on the adapter at hand.
 
 use super::pages::of_tune;
 use super::scaling::{Bench, Case, measure_named, problems};
@@ -15,9 +15,9 @@ use std::time::Instant;
 /// Flags of `bench tune`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Tries workgroups of 32 to 256 lanes, loops with and without wgpu's own bound, and lanes in a dispatch. The best over \
-                  the problems is remembered for the adapter with its driver in the user's cache folder, and used from then on. No \
-                  result depends on it: a setting that changed a bit here is not chosen."
+    after_help = "Tries workgroups of 32 to 256 lanes, and lanes in a dispatch. The best over the problems is remembered for the \
+                  adapter with its driver in the user's cache folder, and used from then on. No result depends on it: a setting that \
+                  changed a bit here is not chosen."
 )]
 pub struct Arguments {
     /// Problems: those of `bench`
@@ -27,7 +27,7 @@ pub struct Arguments {
     /// The most particles of an evaluation
     #[arg(long, default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(64..=4_194_304))]
     population: u32,
-    /// Take fewer particles where an evaluation with the usual settings would take longer than this, s
+    /// Take fewer particles where they fill the device and an evaluation with the usual settings would take longer than this, s
     #[arg(long, value_name = "S", default_value_t = 0.5)]
     longest_s: f64,
     /// Part of the name of the GPU to tune
@@ -42,11 +42,10 @@ pub struct Arguments {
 pub(super) struct Row {
     pub(super) problem: &'static str,
     pub(super) workgroup: u32,
-    pub(super) bounded_loops: bool,
     pub(super) lanes: usize,
     pub(super) population: usize,
-    /// The least of the repetitions.
-    pub(super) evaluation_ms: f64,
+    /// Time of the kernels of an evaluation, the least of the repetitions.
+    pub(super) kernel_ms: f64,
     /// How many times as fast as with the usual settings, measured by turns.
     pub(super) times_usual: f64,
     /// Whether all objectives have the bits that the usual settings give.
@@ -65,7 +64,6 @@ struct Table {
 #[derive(Serialize)]
 struct Best {
     workgroup: u32,
-    bounded_loops: bool,
     lanes: usize,
     /// Geometric mean over the problems.
     times_usual: f64,
@@ -75,12 +73,9 @@ struct Best {
 const COLUMNS: &Columns<Row> = &[
     ("problem", -8, |r| r.problem.to_owned()),
     ("workgroup", 9, |r| r.workgroup.to_string()),
-    ("loops", 10, |r| {
-        if r.bounded_loops { "bounded" } else { "trusted" }.to_owned()
-    }),
     ("lanes", 9, |r| r.lanes.to_string()),
     ("particles", 10, |r| r.population.to_string()),
-    ("ms", 10, |r| format!("{:.2}", r.evaluation_ms)),
+    ("kernel ms", 10, |r| format!("{:.2}", r.kernel_ms)),
     ("times usual", 12, |r| format!("{:.3}", r.times_usual)),
     ("bits", 8, |r| {
         if r.same_bits { "same" } else { "others" }.to_owned()
@@ -88,7 +83,7 @@ const COLUMNS: &Columns<Row> = &[
 ];
 
 /// Evaluations of a setting and of the usual one, of which the fastest count.
-const REPETITIONS: usize = 5;
+const REPETITIONS: usize = 3;
 /// What a setting must gain over the usual one to take its place: less may be chance.
 const GAIN: f64 = 1.05;
 
@@ -106,42 +101,46 @@ impl Bench for Trials<'_> {
         let adapter = self.arguments.adapter.as_deref();
         let open = |tuning| GpuBackend::new(&case.kind, GpuContext::with_tuning(adapter, tuning)?);
         let mut usual = open(Tuning::usual(self.kind))?;
-        // As many as take so long, by the rate of the fewer before.
         let most = self.arguments.population as usize;
-        let mut population = 64;
+        let longest_ms = 1e3 * self.arguments.longest_s;
+        let mut population = most.min(64);
         let mut candidates = case.candidates(population);
         usual.evaluate(&candidates)?;
-        loop {
-            let (took_ms, _) = timed(&mut usual, &candidates)?;
-            let fitting = (population as f64 * 1e3 * self.arguments.longest_s / took_ms) as usize;
-            if population >= most || fitting < 2 * population {
+        let mut timing = Timed::of(&mut usual, &candidates)?;
+        while population < most {
+            let more = (4 * population).min(most);
+            let others = case.candidates(more);
+            let of_more = Timed::of(&mut usual, &others)?;
+            // A device that is not full takes hardly longer for more.
+            let full = of_more.whole_ms > 2.0 * timing.whole_ms;
+            if full && of_more.whole_ms > longest_ms {
                 break;
             }
-            population = fitting.min(16 * population).min(most);
-            candidates = case.candidates(population);
+            (population, candidates, timing) = (more, others, of_more);
         }
-        let (_, expected) = timed(&mut usual, &candidates)?;
+        // As fresh as those that it is compared with.
+        usual = open(Tuning::usual(self.kind))?;
+        usual.evaluate(&candidates)?;
         let bits = |row: &[f64]| row.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         for tuning in Tuning::all(self.kind) {
             let mut evaluator = open(tuning)?;
             evaluator.evaluate(&candidates)?;
-            let (mut usual_ms, mut evaluation_ms) = (f64::INFINITY, f64::INFINITY);
+            let (mut usual_ms, mut kernel_ms) = (f64::INFINITY, f64::INFINITY);
             let mut same_bits = true;
             // By turns, so that other work on the machine holds up both.
             for _ in 0..REPETITIONS {
-                usual_ms = usual_ms.min(timed(&mut usual, &candidates)?.0);
-                let (ms, objectives) = timed(&mut evaluator, &candidates)?;
-                evaluation_ms = evaluation_ms.min(ms);
-                same_bits &= bits(&objectives) == bits(&expected);
+                usual_ms = usual_ms.min(Timed::of(&mut usual, &candidates)?.kernel_ms);
+                let found = Timed::of(&mut evaluator, &candidates)?;
+                kernel_ms = kernel_ms.min(found.kernel_ms);
+                same_bits &= bits(&found.objectives) == bits(&timing.objectives);
             }
             let row = Row {
                 problem: name,
                 workgroup: tuning.workgroup,
-                bounded_loops: tuning.bounded_loops,
                 lanes: tuning.lanes,
                 population,
-                evaluation_ms,
-                times_usual: usual_ms / evaluation_ms,
+                kernel_ms,
+                times_usual: usual_ms / kernel_ms,
                 same_bits,
             };
             if !self.arguments.kept.json {
@@ -153,20 +152,33 @@ impl Bench for Trials<'_> {
     }
 }
 
-/// The time of an evaluation (ms), and its objectives.
-fn timed(evaluator: &mut dyn Evaluator, candidates: &[f64]) -> Result<(f64, Vec<f64>)> {
-    let began = Instant::now();
-    let objectives = evaluator.evaluate(candidates)?.objectives;
-    Ok((began.elapsed().as_secs_f64() * 1e3, objectives))
+/// An evaluation and the time that it took.
+struct Timed {
+    whole_ms: f64,
+    kernel_ms: f64,
+    objectives: Vec<f64>,
+}
+
+impl Timed {
+    fn of(evaluator: &mut dyn Evaluator, candidates: &[f64]) -> Result<Self> {
+        let began = Instant::now();
+        let objectives = evaluator.evaluate(candidates)?.objectives;
+        let whole_ms = began.elapsed().as_secs_f64() * 1e3;
+        Ok(Self {
+            whole_ms,
+            kernel_ms: evaluator.last_kernel_ms().unwrap_or(whole_ms),
+            objectives,
+        })
+    }
 }
 
 /// The setting that is the fastest over all problems, and by how much.
 fn best(kind: DeviceKind, rows: &[Row]) -> (Tuning, f64) {
     let mut best = (Tuning::usual(kind), 1.0);
     for tuning in Tuning::all(kind) {
-        let own = rows.iter().filter(|r| {
-            (r.workgroup, r.bounded_loops, r.lanes) == (tuning.workgroup, tuning.bounded_loops, tuning.lanes)
-        });
+        let own = rows
+            .iter()
+            .filter(|r| (r.workgroup, r.lanes) == (tuning.workgroup, tuning.lanes));
         let own: Vec<&Row> = own.collect();
         let logs: f64 = own.iter().map(|r| r.times_usual.ln()).sum();
         let mean = (logs / own.len().max(1) as f64).exp();
@@ -205,14 +217,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (tuning, times_usual) = best(summary.kind, &trials.rows);
     let file = tuning.remember(&summary)?.display().to_string();
     let told = format!(
-        "Remembered in {file}: workgroups of {}, {} loops, {} lanes, {times_usual:.2} times as fast as usual.",
-        tuning.workgroup,
-        if tuning.bounded_loops {
-            "bounded"
-        } else {
-            "trusted"
-        },
-        tuning.lanes
+        "Remembered in {file}: workgroups of {}, {} lanes, {times_usual:.2} times as fast as usual.",
+        tuning.workgroup, tuning.lanes
     );
     if !arguments.kept.json {
         outln!("{told}");
@@ -222,7 +228,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         adapter: summary.to_string(),
         best: Best {
             workgroup: tuning.workgroup,
-            bounded_loops: tuning.bounded_loops,
             lanes: tuning.lanes,
             times_usual,
             file,
@@ -242,10 +247,9 @@ mod tests {
         Row {
             problem: "line",
             workgroup: tuning.workgroup,
-            bounded_loops: tuning.bounded_loops,
             lanes: tuning.lanes,
             population: 64,
-            evaluation_ms: 1.0,
+            kernel_ms: 1.0,
             times_usual,
             same_bits,
         }

@@ -10,7 +10,7 @@ use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::line::LineObjective;
 use lapswarm::evaluate::{BackendChoice, Evaluator, GpuBackend, OnDevice, Problem};
 use lapswarm::swarm::device::DeviceMopso;
-use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser, Pso};
+use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser};
 use lapswarm::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
@@ -86,16 +86,11 @@ struct Generations<'a> {
     rows: Vec<Row>,
 }
 
-/// The problem with the variables as near to their middles as the bench's candidates are, so that swarms stay there.
-fn narrowed<K: OnDevice>(case: &Case<K>) -> Problem {
-    let mut problem = case.kind.problem().clone();
-    for (variable, (middle, reach)) in problem.variables.iter_mut().zip(&case.about) {
-        let (low, high) = (middle - reach, middle + reach);
-        if !variable.whole {
-            (variable.lower, variable.upper) = (low.max(variable.lower), high.min(variable.upper));
-        }
-    }
-    problem
+/// The first particles of a swarm: the bench's candidates.
+fn starts<K: OnDevice>(case: &Case<K>, population: usize) -> Vec<Vec<f64>> {
+    let candidates = case.candidates(population);
+    let rows = candidates.chunks_exact(case.about.len());
+    rows.map(<[f64]>::to_vec).collect()
 }
 
 impl Bench for Generations<'_> {
@@ -110,7 +105,7 @@ impl Bench for Generations<'_> {
     fn measure_all<K: OnDevice>(&mut self, name: &'static str, case: &Case<K>) -> Result<()> {
         let choice = self.arguments.backend.unwrap_or_default();
         let adapter = self.arguments.adapter.as_deref();
-        let problem = narrowed(case);
+        let problem = case.kind.problem();
         let arguments = self.arguments;
         for mut evaluator in case.evaluators(choice, adapter)? {
             let info = evaluator.backend();
@@ -118,13 +113,9 @@ impl Bench for Generations<'_> {
             if info.backend == "cpu" {
                 continue;
             }
-            self.measure(
-                name,
-                (info.backend, info.device),
-                "host",
-                &problem,
-                |population| arguments.on_the_host(&problem, evaluator.as_mut(), population),
-            )?;
+            self.measure(name, (info.backend, info.device), "host", problem, |population| {
+                arguments.on_the_host(case, evaluator.as_mut(), population)
+            })?;
         }
         let wanted = match choice {
             BackendChoice::Gpu => true,
@@ -140,14 +131,11 @@ impl Bench for Generations<'_> {
                 name,
                 (info.backend, info.device),
                 "device",
-                &problem,
+                problem,
                 |population| {
-                    let settings =
-                        MopsoSettings::default().with_size(population, arguments.generations as usize + 1);
-                    let mut swarm = DeviceMopso::new(case.kind.problem(), settings, context.clone())?;
-                    let few = case.candidates(population);
-                    let rows = few.chunks_exact(case.about.len()).map(<[f64]>::to_vec);
-                    swarm.start_from(&rows.collect::<Vec<_>>())?;
+                    let settings = arguments.settings(population);
+                    let mut swarm = DeviceMopso::new(problem, settings, context.clone())?;
+                    swarm.start_from(&starts(case, population))?;
                     swarm.step(&mut evaluator)?;
                     arguments.timed(|| {
                         let before = context.dispatched_ms();
@@ -215,19 +203,19 @@ impl Arguments {
         Ok([began.elapsed().as_secs_f64() * 1e3 * each, kernels * each])
     }
 
-    /// The usual swarm for so many objectives, asked and told on the host.
-    fn on_the_host(
+    fn settings(&self, population: usize) -> MopsoSettings {
+        MopsoSettings::default().with_size(population, self.generations as usize + 1)
+    }
+
+    /// The swarm asked and told on the host.
+    fn on_the_host<K: OnDevice>(
         &self,
-        problem: &Problem,
+        case: &Case<K>,
         evaluator: &mut dyn Evaluator,
         population: usize,
     ) -> Result<[f64; 2]> {
-        let settings = MopsoSettings::default().with_size(population, self.generations as usize + 1);
-        let mut swarm: Box<dyn Optimiser> = if problem.objectives.len() == 1 {
-            Box::new(Pso::new(problem, settings.motion)?)
-        } else {
-            Box::new(Mopso::new(problem, settings)?)
-        };
+        let mut swarm = Mopso::new(case.kind.problem(), self.settings(population))?;
+        swarm.start_from(&starts(case, population))?;
         let mut generation = || {
             let candidates = swarm.ask();
             let evaluation = evaluator.evaluate(&candidates)?;

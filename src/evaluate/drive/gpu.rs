@@ -11,6 +11,7 @@ use crate::evaluate::gpu::{
 };
 use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
+use rayon::prelude::*;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
@@ -121,8 +122,8 @@ impl DeviceKernel<DriveProblem> for DriveDevice {
         self.trajectories.count_anew();
         let mut laps = Vec::with_capacity(candidates.len());
         for batch in candidates.chunks(self.trajectories.batch_size()) {
-            let states = self.driven(drive, batch)?.into_iter();
-            laps.extend(states.map(|s| drive.lap(s.map(f64::from))));
+            let states = self.driven(drive, batch)?.into_par_iter();
+            laps.par_extend(states.map(|s| drive.lap(s.map(f64::from))));
         }
         Ok(laps)
     }

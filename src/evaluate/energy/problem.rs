@@ -255,21 +255,6 @@ impl HybridProblem {
         })
     }
 
-    /// The same by other objectives.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if objectives are missing or come twice.
-    pub fn by(mut self, objectives: &[HybridObjective]) -> Result<Self> {
-        if missing_or_twice(objectives) {
-            let found = format!("{objectives:?}");
-            let expected = "at least one, each once";
-            return Err(Error::input("hybrid", "objectives", found, expected));
-        }
-        self.problem.objectives = listed(objectives);
-        self.objectives = objectives.to_vec();
-        Ok(self)
-    }
-
     /// The line.
     pub fn line(&self) -> &HybridLine {
         &self.line

@@ -198,16 +198,17 @@ impl<K: OnDevice> GpuBackend<'_, K> {
             });
         let evaluation = Evaluator::evaluate(self, &population)?;
         let mut rows = vec![0.0f32; lanes * width];
-        let told = evaluation
-            .objectives
-            .chunks_exact(width)
-            .zip(&evaluation.failures);
-        for (i, (row, failure)) in told.enumerate() {
-            for (k, cost) in row.iter().enumerate() {
-                rows[(i / BLOCK * width + k) * BLOCK + i % BLOCK] =
-                    failure.map_or(*cost as f32, failed_objective);
-            }
-        }
+        rows.par_chunks_exact_mut(BLOCK * width)
+            .zip(evaluation.objectives.par_chunks(BLOCK * width))
+            .zip(evaluation.failures.par_chunks(BLOCK))
+            .for_each(|((block, told), failures)| {
+                let told = told.chunks_exact(width).zip(failures);
+                for (lane, (row, failure)) in told.enumerate() {
+                    for (k, cost) in row.iter().enumerate() {
+                        block[k * BLOCK + lane] = failure.map_or(*cost as f32, failed_objective);
+                    }
+                }
+            });
         let place = (first * width * 4) as u64;
         let context = self.device.context();
         context.write_at(objectives, place, bytemuck::cast_slice(&rows));

@@ -231,7 +231,7 @@ impl GpuContext {
         self.wheels
     }
 
-    /// How kernels of lines and cars are compiled and dispatched here.
+    /// How kernels of lines and cars are dispatched here.
     pub fn tuning(&self) -> Tuning {
         self.tuning
     }

@@ -7,6 +7,8 @@ mod fallback;
 pub mod faults;
 pub mod lint;
 mod pacing;
+#[cfg(feature = "vehicle")]
+mod planes;
 pub mod shader;
 mod spread;
 #[cfg(feature = "vehicle")]
@@ -22,6 +24,8 @@ pub use fallback::FallbackEvaluator;
 pub use pacing::Batching;
 #[cfg(feature = "vehicle")]
 pub(crate) use pacing::{LOOP_ROUNDS, LanePacing, most_rounds, rounds_of};
+#[cfg(feature = "vehicle")]
+pub(in crate::evaluate) use planes::planes;
 pub use spread::Spread;
 #[cfg(feature = "vehicle")]
 pub use trajectories::TrajectoryStretch;

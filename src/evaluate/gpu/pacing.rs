@@ -92,7 +92,7 @@ impl Pacing {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LanePacing {
     first: usize,
-    /// Lanes of the last dispatch, and how long it took, ms.
+    /// Lanes of the last dispatch that taught anything, and how long it took, ms.
     last: Option<(usize, f64)>,
 }
 
@@ -113,7 +113,13 @@ impl LanePacing {
 
     /// Notes how long a dispatch took, ms. The first one of all may have compiled; the next one corrects what it taught.
     pub fn took(&mut self, lanes: usize, ms: f64) {
-        self.last = Some((lanes, ms));
+        // Fewer that took no longer teach nothing: a device that was not full does not do as many in the time.
+        let teaches = |(before, took): (usize, f64)| {
+            lanes >= before || ms > took || lanes as f64 / ms >= before as f64 / took
+        };
+        if self.last.is_none_or(teaches) {
+            self.last = Some((lanes, ms));
+        }
     }
 }
 
@@ -223,6 +229,20 @@ mod tests {
         assert_eq!(pacing.steps(64, &few), 3);
         pacing.took(usize::MAX / 8, 64, 1e-3);
         assert_eq!(pacing.steps(64, &batching), LOOP_ROUNDS / 5);
+    }
+
+    #[test]
+    fn a_few_lanes_after_many_do_not_cut_the_next_dispatch() {
+        let mut pacing = LanePacing::new(64);
+        pacing.took(100_000, 2.0);
+        pacing.took(400, 0.7);
+        assert_eq!(pacing.lanes(TARGET_MS), 400_000);
+        // Unless the device has become slower, or the many had to wait for a compiler.
+        pacing.took(400, 3.0);
+        assert_eq!(pacing.lanes(TARGET_MS), 1_600);
+        pacing.took(1_600, 9_000.0);
+        pacing.took(64, 0.5);
+        assert_eq!(pacing.lanes(TARGET_MS), 256);
     }
 
     #[test]

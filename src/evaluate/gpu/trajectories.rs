@@ -3,10 +3,12 @@
 use super::DeviceKind;
 use super::context::{Binding, GpuContext, Kernel};
 use super::pacing::{Batching, Pacing, most_rounds};
+use super::planes::planes;
 use super::shader::base_vectors;
 use crate::error::{Error, Result};
 use crate::evaluate::ModelTable;
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
@@ -81,7 +83,7 @@ impl<const STATE: usize> Trajectories<STATE> {
         use Binding::{Read, Uniform, Write};
         let (kinds, tables): (Vec<_>, Vec<_>) = parts.tables.into_iter().unzip();
         let bindings = [vec![Uniform, Uniform, Read, Write], kinds].concat();
-        let kernel = context.own_kernel(parts.source, parts.entry, &bindings)?;
+        let kernel = context.kernel(parts.source, parts.entry, &bindings)?;
         let mut base = parts.table.base.clone();
         base.resize(base_vectors(base.len()) * 4, 0.0);
         let base = context.buffer_of("parameters", bytemuck::cast_slice(&base), Usage::UNIFORM)?;
@@ -189,21 +191,19 @@ impl<const STATE: usize> Trajectories<STATE> {
         &mut self,
         candidates: usize,
         rows: &[f32],
-        others: impl Fn(usize) -> [f64; OTHERS],
+        others: impl Fn(usize) -> [f64; OTHERS] + Sync,
     ) -> Result<()> {
         self.reserve(candidates)?;
         let batch = self.buffers()?;
-        // Figure by figure, so that neighbouring lanes read neighbouring memory.
-        let mut figures = vec![0.0f32; batch.stride * self.figures];
-        for lane in 0..candidates {
-            let car = rows[lane * self.varying..(lane + 1) * self.varying]
-                .iter()
-                .copied();
-            let others = others(lane).map(|x| x as f32);
-            for (figure, value) in car.chain(others).enumerate() {
-                figures[figure * batch.stride + lane] = value;
-            }
-        }
+        let others: Vec<[f64; OTHERS]> = (0..candidates).into_par_iter().map(&others).collect();
+        let varying = self.varying;
+        let figures = planes(
+            [candidates, batch.stride, self.figures],
+            |lane, figure| match figure.checked_sub(varying) {
+                None => rows[lane * varying + figure],
+                Some(other) => others[lane][other] as f32,
+            },
+        );
         self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
         Ok(())
     }
@@ -266,6 +266,7 @@ impl<const STATE: usize> Trajectories<STATE> {
     pub fn states(&self, candidates: usize) -> Result<Vec<[f32; STATE]>> {
         self.read_planes(0, |planes, stride| {
             (0..candidates)
+                .into_par_iter()
                 .map(|lane| std::array::from_fn(|k| planes[k * stride + lane]))
                 .collect()
         })

@@ -6,13 +6,11 @@ use crate::error::{Error, Result};
 use crate::files::{cache_folder, stem, write_whole};
 use std::path::PathBuf;
 
-/// How kernels of lines and cars are compiled and dispatched on an adapter.
+/// How kernels of lines and cars are dispatched on an adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tuning {
     /// Lanes of a workgroup, where the device allows.
     pub workgroup: u32,
-    /// Whether loops are bounded by a counter of their own, which wgpu adds against loops without an end. Kernels here have none.
-    pub bounded_loops: bool,
     /// The most lanes of a dispatch of replays; half as many laps or steady states on a card, a fourth on a software driver.
     pub lanes: usize,
 }
@@ -23,7 +21,6 @@ impl Tuning {
     pub fn usual(kind: DeviceKind) -> Self {
         Self {
             workgroup: 64,
-            bounded_loops: true,
             lanes: match kind {
                 DeviceKind::Software => 1 << 14,
                 _ => 1 << 18,
@@ -36,13 +33,10 @@ impl Tuning {
         let usual = Self::usual(kind);
         let mut all = vec![usual];
         for workgroup in [32, 64, 128, 256] {
-            for bounded_loops in [true, false] {
-                all.extend([1, 4].map(|times| Self {
-                    workgroup,
-                    bounded_loops,
-                    lanes: times * usual.lanes,
-                }));
-            }
+            all.extend([1, 4].map(|times| Self {
+                workgroup,
+                lanes: times * usual.lanes,
+            }));
         }
         let first = 1 + all[1..].iter().position(|other| *other == usual).unwrap_or(0);
         all.remove(first);
@@ -65,7 +59,6 @@ impl Tuning {
         };
         let found = Self {
             workgroup: value("workgroup")?.parse().ok()?,
-            bounded_loops: value("bounded_loops")?.parse().ok()?,
             lanes: value("lanes")?.parse().ok()?,
         };
         // Nothing else is tried, and other values may suit no kernel.
@@ -84,8 +77,8 @@ impl Tuning {
             std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
         }
         let text = format!(
-            "# {adapter}, {} {}\nworkgroup = {}\nbounded_loops = {}\nlanes = {}\n",
-            adapter.driver, adapter.driver_info, self.workgroup, self.bounded_loops, self.lanes
+            "# {adapter}, {} {}\nworkgroup = {}\nlanes = {}\n",
+            adapter.driver, adapter.driver_info, self.workgroup, self.lanes
         );
         write_whole(&path, text.as_bytes())?;
         Ok(path)
@@ -114,25 +107,15 @@ mod tests {
     fn what_is_tried_begins_with_the_usual_and_is_read_back() {
         for kind in [DeviceKind::Software, DeviceKind::Discrete] {
             let all = Tuning::all(kind);
-            assert_eq!((all.len(), all[0]), (16, Tuning::usual(kind)));
+            assert_eq!((all.len(), all[0]), (8, Tuning::usual(kind)));
             for tuning in all {
-                let Tuning {
-                    workgroup,
-                    bounded_loops,
-                    lanes,
-                } = tuning;
-                let text = format!(
-                    "# x\nworkgroup = {workgroup}\nbounded_loops = {bounded_loops}\nlanes = {lanes}\n"
-                );
+                let Tuning { workgroup, lanes } = tuning;
+                let text = format!("# x\nworkgroup = {workgroup}\nlanes = {lanes}\n");
                 assert_eq!(Tuning::read(&text), Some(tuning));
                 assert_eq!(Tuning::read(&text[..text.len() / 2]), None);
             }
         }
-        for damaged in [
-            "",
-            "workgroup = 64",
-            "workgroup = 0\nbounded_loops = true\nlanes = 0\n",
-        ] {
+        for damaged in ["", "workgroup = 64", "workgroup = 0\nlanes = 0\n"] {
             assert_eq!(Tuning::read(damaged), None, "{damaged}");
         }
     }

@@ -6,7 +6,9 @@ use super::kernel::{BLOCK, CHANNELS};
 use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{CarShape, ReplayShape, base_vectors};
-use crate::evaluate::gpu::{Binding, GpuContext, Kernel, LOOP_ROUNDS, most_rounds, rounds_of, workgroup};
+use crate::evaluate::gpu::{
+    Binding, GpuContext, Kernel, LOOP_ROUNDS, most_rounds, planes, rounds_of, workgroup,
+};
 use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
@@ -159,12 +161,12 @@ impl DeviceKernel<ReplayProblem> for ReplayDevice {
             norm: replay.plan.norm,
         };
         use Binding::{Read, Uniform, Write};
-        let drive = context.own_kernel(
+        let drive = context.kernel(
             &shape.replay(),
             "replay",
             &[Uniform, Uniform, Read, Read, Read, Read, Write],
         )?;
-        let reduce = context.own_kernel(&shape.reduce(), "replay_reduce", &[Uniform, Read, Write])?;
+        let reduce = context.kernel(&shape.reduce(), "replay_reduce", &[Uniform, Read, Write])?;
 
         let plan = replay.plan.to_f32();
         let substeps = plan.fractions.len();
@@ -449,13 +451,9 @@ impl ReplayDevice {
             let stride = candidates.len().next_multiple_of(self.workgroup);
             let varying = self.table.varying.len();
             let by_candidate = self.table.rows(&replay.free, candidates);
-            // Figure by figure, so that neighbouring lanes read neighbouring memory.
-            let mut figures = vec![0.0f32; stride * varying];
-            for (candidate, row) in by_candidate.chunks_exact(varying.max(1)).enumerate() {
-                for (figure, value) in row.iter().enumerate() {
-                    figures[figure * stride + candidate] = *value;
-                }
-            }
+            let figures = planes([candidates.len(), stride, varying], |candidate, figure| {
+                by_candidate[candidate * varying + figure]
+            });
             let batch = self.buffers()?;
             self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
             for first_window in (0..all_windows).step_by(most_windows) {

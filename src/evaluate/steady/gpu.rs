@@ -10,6 +10,7 @@ use crate::evaluate::gpu::{
 use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// How candidates are brought to settle. Twin of `SettlePlan` in `shaders/steady.wgsl`.
@@ -97,8 +98,8 @@ impl DeviceKernel<SteadyProblem> for SteadyDevice {
     fn outcomes(&mut self, steady: &SteadyProblem, candidates: &[&[f64]]) -> Result<Vec<Settling<f64>>> {
         let mut found = Vec::with_capacity(candidates.len());
         for batch in candidates.chunks(self.trajectories.batch_size()) {
-            let states = self.settled(steady, batch)?.into_iter();
-            found.extend(states.map(|state| Settling::from_array(state).widened()));
+            let states = self.settled(steady, batch)?.into_par_iter();
+            found.par_extend(states.map(|state| Settling::from_array(state).widened()));
         }
         Ok(found)
     }

@@ -1,6 +1,7 @@
 //! The normal distribution that the particles are drawn from, and how it adapts.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Centre, step size and covariance over the unit cube, with their evolution paths.
@@ -26,6 +27,9 @@ fn square<'de, D: Deserializer<'de>>(deserializer: D) -> Result<DMatrix<f64>, D:
     }
     Ok(DMatrix::from_vec(rows, columns, figures))
 }
+
+/// Particles that are worth a thread.
+pub(in crate::swarm) const FEW: usize = 64;
 
 /// Eigenvalues of the covariance are kept above this.
 const LEAST_VARIANCE: f64 = 1e-20;
@@ -88,14 +92,21 @@ impl Distribution {
         let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
 
         let old = self.mean.clone();
-        let steps: Vec<DVector<f64>> = ranked.iter().map(|&x| (x - &old) / self.step).collect();
-        let shift = steps
-            .iter()
-            .zip(&weights)
-            .fold(DVector::zeros(old.len()), |acc, (y, w)| acc + y * *w);
+        let steps: Vec<DVector<f64>> = ranked
+            .par_iter()
+            .with_min_len(FEW)
+            .map(|&x| (x - &old) / self.step)
+            .collect();
+        let mut shift = DVector::zeros(old.len());
+        for (y, w) in steps.iter().zip(&weights) {
+            shift.axpy(*w, y, 1.0);
+        }
         self.mean = old + &shift * self.step;
 
-        let whitened = &self.basis * self.whiten(&shift);
+        // Along the axes of the covariance, in standard deviations.
+        let across = self.basis.transpose();
+        let whiten = |step: &DVector<f64>| (&across * step).component_div(&self.scales);
+        let whitened = &self.basis * whiten(&shift);
         self.step_path = &self.step_path * (1.0 - rate_step)
             + whitened * (rate_step * (2.0 - rate_step) * effective).sqrt();
         self.age += 1;
@@ -115,9 +126,10 @@ impl Distribution {
             + (1.0 - heaviside) * rate_one * rate_path * (2.0 - rate_path);
         // The lengths of the steps that are unlearnt are evened out, which keeps the matrix positive.
         let lengths: Vec<f64> = steps[parents..]
-            .iter()
+            .par_iter()
             .zip(&unlearnt)
-            .map(|(y, _)| self.whiten(y).norm_squared())
+            .with_min_len(FEW)
+            .map(|(y, _)| whiten(y).norm_squared())
             .collect();
         self.covariance *= kept;
         self.covariance
@@ -136,11 +148,6 @@ impl Distribution {
         let eigen = SymmetricEigen::new(self.covariance.clone());
         self.scales = eigen.eigenvalues.map(|v| v.max(LEAST_VARIANCE).sqrt());
         self.basis = eigen.eigenvectors;
-    }
-
-    /// A step along the axes of the covariance, in standard deviations.
-    fn whiten(&self, step: &DVector<f64>) -> DVector<f64> {
-        (self.basis.transpose() * step).component_div(&self.scales)
     }
 }
 

@@ -18,8 +18,9 @@ use super::{Counters, Front, Optimiser};
 use crate::error::{Error, Result};
 use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
-pub(super) use distribution::Distribution;
+pub(super) use distribution::{Distribution, FEW};
 use nalgebra::DVector;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -181,7 +182,7 @@ impl CovarianceSwarm {
                 OutOfBounds::Reflected => drawn.map(folded),
             }
         };
-        self.positions = (0..count).map(draw).collect();
+        self.positions = (0..count).into_par_iter().with_min_len(FEW).map(draw).collect();
     }
 
     /// Notes the iteration's best and says whether there is nothing left to gain from this start.
@@ -243,11 +244,16 @@ fn folded(x: f64) -> f64 {
 
 impl Optimiser for CovarianceSwarm {
     fn ask(&mut self) -> Vec<f64> {
-        let rows: Vec<f64> = self
-            .positions
-            .iter()
-            .flat_map(|p| p.iter().copied().map(folded))
-            .collect();
+        let d = self.space.dimensions();
+        let mut rows = vec![0.0; self.positions.len() * d];
+        rows.par_chunks_exact_mut(d.max(1))
+            .zip(&self.positions)
+            .with_min_len(FEW)
+            .for_each(|(row, position)| {
+                for (x, drawn) in row.iter_mut().zip(position.iter()) {
+                    *x = folded(*drawn);
+                }
+            });
         self.space.scaled(&rows, self.positions.len())
     }
 

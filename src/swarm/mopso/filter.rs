@@ -8,6 +8,7 @@
 
 use crate::evaluate::resident::BLOCK;
 use crate::swarm::metrics::Staircase;
+use rayon::prelude::*;
 
 /// Objectives (zero for those beyond the number of objectives) and the number of the particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,9 +71,15 @@ pub fn part(
 
 /// Fewer points than this are swept as they are.
 const FEW: usize = 32;
+/// More points than this are swept in parts first, each in a thread.
+const MANY: usize = 4096;
 
 /// The points that no other dominates, by number of the particle; of equal points the first. `O(n log n)`.
 pub fn front(mut points: Vec<Point>, width: usize) -> Vec<Point> {
+    if points.len() > MANY {
+        let parts = points.par_chunks(MANY);
+        points = parts.flat_map_iter(|part| front(part.to_vec(), width)).collect();
+    }
     if points.len() > FEW {
         for pivot in pivots(&points, width) {
             points.retain(|p| !beats(&pivot, &p.at));
@@ -80,7 +87,7 @@ pub fn front(mut points: Vec<Point>, width: usize) -> Vec<Point> {
     }
     let kept = if width == 2 {
         let key = |p: &Point| (p.at[0], p.at[1]);
-        points.sort_unstable_by(|a, b| order(&key(a), &key(b)).then(a.who.cmp(&b.who)));
+        points.par_sort_unstable_by(|a, b| order(&key(a), &key(b)).then(a.who.cmp(&b.who)));
         let mut least = f64::INFINITY;
         points.retain(|p| {
             let better = p.at[1] < least;
@@ -90,7 +97,7 @@ pub fn front(mut points: Vec<Point>, width: usize) -> Vec<Point> {
         points
     } else {
         let key = |p: &Point| (p.at[2], p.at[1], p.at[0]);
-        points.sort_unstable_by(|a, b| order(&key(a), &key(b)).then(a.who.cmp(&b.who)));
+        points.par_sort_unstable_by(|a, b| order(&key(a), &key(b)).then(a.who.cmp(&b.who)));
         let mut stairs = Staircase::default();
         points.retain(|p| {
             let better = !stairs.covers(p.at[0], p.at[1]);
@@ -102,7 +109,7 @@ pub fn front(mut points: Vec<Point>, width: usize) -> Vec<Point> {
         points
     };
     let mut kept = kept;
-    kept.sort_unstable_by_key(|p| p.who);
+    kept.par_sort_unstable_by_key(|p| p.who);
     kept
 }
 
@@ -153,4 +160,43 @@ fn pivots(points: &[Point], width: usize) -> Vec<[f64; 3]> {
         }
     }
     best[..weights.len()].iter().map(|b| b.1).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// More points than a part has, some of them equal, in another order: the same front, and no point of it is beaten.
+    #[test]
+    fn the_front_of_many_points_does_not_depend_on_their_order() {
+        let random = Random::new(1);
+        for width in [2, 3] {
+            let points: Vec<Point> = (0..3 * MANY as u32)
+                .map(|who| {
+                    let draw = |k: u32| random.uniform(1, 0, who / 2, k);
+                    let mut at = [draw(0), draw(1), 0.0];
+                    if width == 3 {
+                        at[2] = (2.0 - at[0] - at[1]).max(0.0) + 0.01 * draw(2);
+                    }
+                    Point { at, who }
+                })
+                .collect();
+            let mut turned = points.clone();
+            turned.reverse();
+            let found = front(points.clone(), width);
+            assert_eq!(found, front(turned, width));
+            assert!(
+                found.len() > if width == 2 { 3 } else { MANY / 4 },
+                "{}",
+                found.len()
+            );
+            let of_pairs = |p: &Point| p.who.is_multiple_of(2);
+            assert!(found.iter().all(of_pairs), "of equal points the first");
+            for p in points.iter().filter(|p| of_pairs(p)) {
+                let open = !points.iter().any(|other| beats(&other.at, &p.at));
+                assert_eq!(found.contains(p), open);
+            }
+        }
+    }
 }

@@ -3,6 +3,7 @@
 
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreInput};
 pub use crate::evaluate::IllFormed;
+use std::f64::consts::FRAC_PI_2;
 
 /// Loads (in nominal loads) at which a tyre is checked: from a nearly lifted wheel to a loaded outer one.
 const LOADS: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
@@ -25,9 +26,20 @@ impl TyreCoefficients<f64> {
         if self.to_flat().iter().any(|x| !x.is_finite()) {
             return Err(IllFormed::NotFinite);
         }
-        let shape = |c: f64, b: f64, e: f64, x: f64| {
+        // A weight's denominator is cos(c atan u). It is above `least`, and was all the way from u = 0, where |u| is below this.
+        let reach = |c: f64, least: f64| {
+            let angle = least.acos() / c.abs();
+            if angle < FRAC_PI_2 {
+                angle.tan()
+            } else {
+                f64::INFINITY
+            }
+        };
+        let [denominator_x, denominator_y] =
+            [self.rcx1, self.rcy1].map(|c| [reach(c, LEAST_DENOMINATOR), reach(c, 0.0)]);
+        let within = |most: f64, b: f64, e: f64, x: f64| {
             let u = b * x - e.min(1.0) * (b * x - (b * x).atan());
-            (c * u.atan()).cos()
+            u.abs() < most
         };
         let tyre = self.prepare(0.0);
         for share in LOADS {
@@ -50,14 +62,9 @@ impl TyreCoefficients<f64> {
             // The slopes are steepest where the other slip is zero, so the denominators are least there.
             let bx = self.rbx1 * self.lxal;
             let by = self.rby1 * self.lyka;
-            if !(shape(self.rcx1, bx, ex, self.rhx1) > LEAST_DENOMINATOR
-                && shape(self.rcy1, by, ey, shift) > LEAST_DENOMINATOR)
-            {
-                return Err(IllFormed::Weighting);
-            }
-            for slip in [-WORKING_SLIP, WORKING_SLIP] {
-                if !(shape(self.rcx1, bx, ex, slip + self.rhx1) > 0.0
-                    && shape(self.rcy1, by, ey, slip + shift) > 0.0)
+            for (slip, which) in [(0.0, 0), (-WORKING_SLIP, 1), (WORKING_SLIP, 1)] {
+                if !(within(denominator_x[which], bx, ex, slip + self.rhx1)
+                    && within(denominator_y[which], by, ey, slip + shift))
                 {
                     return Err(IllFormed::Weighting);
                 }

@@ -93,25 +93,7 @@ impl GpuContext {
     /// # Errors
     /// [`Error::Device`] if it does not compile.
     pub fn kernel(&self, source: &str, entry: &str, bindings: &[Binding]) -> Result<Arc<Kernel>> {
-        self.compiled(source, entry, bindings, true)
-    }
-
-    /// As [`GpuContext::kernel`], one of the program's own, whose loops all end.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if it does not compile.
-    pub(crate) fn own_kernel(&self, source: &str, entry: &str, bindings: &[Binding]) -> Result<Arc<Kernel>> {
-        self.compiled(source, entry, bindings, self.tuning.bounded_loops)
-    }
-
-    fn compiled(
-        &self,
-        source: &str,
-        entry: &str,
-        bindings: &[Binding],
-        bounded_loops: bool,
-    ) -> Result<Arc<Kernel>> {
-        let key = format!("{entry} {bindings:?} {bounded_loops}\n{source}");
+        let key = format!("{entry} {bindings:?}\n{source}");
         if let Some(kernel) = locked(&self.kernels).get(&key) {
             return Ok(Arc::clone(kernel));
         }
@@ -138,22 +120,10 @@ impl GpuContext {
             })
             .collect();
         let (pipeline, layout) = self.scoped(&format!("compile the kernel {entry}"), || {
-            let described = wgpu::ShaderModuleDescriptor {
+            let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(entry),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
-            };
-            let module = if bounded_loops {
-                self.device.create_shader_module(described)
-            } else {
-                let checks = wgpu::ShaderRuntimeChecks {
-                    force_loop_bounding: false,
-                    ..wgpu::ShaderRuntimeChecks::checked()
-                };
-                // SAFETY: every other check is on. Without this one, loops must end. Only the program's own kernels come here: their loops
-                // count up to bounds that do not change while they run; the one over a line's sections goes by a table, each of whose
-                // places names a later one.
-                unsafe { self.device.create_shader_module_trusted(described, checks) }
-            };
+            });
             let layout = self
                 .device
                 .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {

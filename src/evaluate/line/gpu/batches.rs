@@ -3,11 +3,10 @@
 use super::exchange::Exchange;
 use super::tables::LineTables;
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext, Kernel, LanePacing};
+use crate::evaluate::gpu::{Batching, Binding, DeviceKind, GpuContext, Kernel, LanePacing, planes};
 use crate::line::{EnvelopeTable, LinePlan};
 use crate::vehicle::powertrain::GRAVITY_MPS2;
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
@@ -146,7 +145,7 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
                 context.summary(),
             )));
         }
-        let kernel = context.own_kernel(parts.source, parts.entry, &bindings)?;
+        let kernel = context.kernel(parts.source, parts.entry, &bindings)?;
         let stretch = context.buffer(
             "stretch",
             size_of::<LineStretch>() as u64,
@@ -331,18 +330,11 @@ impl<const FIGURES: usize> LineBatches<FIGURES> {
             self.reserve(count)?;
             let batch = self.buffers()?;
             let stride = batch.stride;
-            // Figure by figure, so that neighbouring lanes read neighbouring memory. What is not a number never reaches the
-            // device, where it may count as anything.
-            let mut variables = vec![0.0f32; stride * self.variables];
-            variables
-                .par_chunks_exact_mut(stride)
-                .enumerate()
-                .for_each(|(variable, row)| {
-                    for (lane, out) in row[..count].iter_mut().enumerate() {
-                        let value = figure(first + lane, variable) as f32;
-                        *out = if value.is_finite() { value } else { 0.0 };
-                    }
-                });
+            // What is not a number never reaches the device, where it may count as anything.
+            let variables = planes([count, stride, self.variables], |lane, variable| {
+                let value = figure(first + lane, variable) as f32;
+                if value.is_finite() { value } else { 0.0 }
+            });
             self.context
                 .write(&batch.variables, bytemuck::cast_slice(&variables));
             self.score_batch(count)?;

@@ -112,7 +112,7 @@ impl Exchange {
             return Err(Error::Device("a swarm without a free variable".to_owned()));
         }
         let source = line_swarm();
-        let kernel = |entry: &str| context.own_kernel(&source, entry, &[Uniform, Read, Read, Write]);
+        let kernel = |entry: &str| context.kernel(&source, entry, &[Uniform, Read, Read, Write]);
         let table = |label: &str, rows: &[u8]| context.buffer_of(label, rows, Usage::STORAGE);
         let size = size_of::<DeviceExchange>() as u64;
         Ok(Self {
