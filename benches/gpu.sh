@@ -1,5 +1,5 @@
 #!/bin/sh
-# What a GPU makes of lapswarm, in five minutes: devices, parity, tuning (remembered for this adapter), rates against population,
+# What a GPU makes of lapswarm, in a few minutes: devices, parity, tuning (remembered for this adapter), rates against population,
 # whole generations from 1e3 to 1e6 particles, and a study of each kind. Writes one JSON and one Markdown file into a folder, for
 # `benches/results/`.
 #

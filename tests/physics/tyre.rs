@@ -191,6 +191,16 @@ fn ill_formed_sets_are_told_apart() {
     );
     // cos(2 atan(20 * 0.15)) = (1 - 9)/(1 + 9): force against the slip.
     assert_eq!(verdict("RCY1=2 REY1=0 REY2=0 RBY1=20"), Err(IllFormed::Weighting));
+    // 4.5 atan(25 * 0.15) = 5.9: the cosine is above zero again, and was below it on the way.
+    assert_eq!(
+        verdict("RCX1=4.5 REX1=0 REX2=0 RBX1=25 RHX1=0"),
+        Err(IllFormed::Weighting)
+    );
+    // The weight at this slip vanishes where the shape factor is a right angle over that angle, 1.1989.
+    for (factor, expected) in [(1.1989, Ok(())), (1.199, Err(IllFormed::Weighting))] {
+        let change = format!("RCX1={factor} REX1=0 REX2=0 RBX1=25 RHX1=0 LXAL=1");
+        assert_eq!(verdict(&change), expected, "{factor}");
+    }
     let mut tyre = set_b();
     tyre.rvy3 = f64::NAN;
     assert_eq!(tyre.well_formed(), Err(IllFormed::NotFinite));

@@ -18,7 +18,7 @@ use std::time::Instant;
 /// Flags of `bench whole`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Problems: those of `bench`, by two or three objectives
+    /// Problems: those of `bench`, by three objectives
     #[arg(long, value_delimiter = ',', default_value = "replay,line,energy,drive,steady",
           value_parser = PossibleValuesParser::new(problems::<Generations<'_>>().map(|(name, _)| name)))]
     problems: Vec<String>,
