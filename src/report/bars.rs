@@ -3,7 +3,7 @@
 use super::axis::{Axis, Labels, Plot, draw_legend, extent};
 use super::canvas::{Align, Type, draw_to_file};
 use super::curves::Scale;
-use super::html::Numbers;
+use super::html::{Numbers, raised};
 use super::style::{INK, LABEL_PX, TICK_PX, series_colour};
 use super::{Figure, HtmlReport};
 use crate::{Error, Result};
@@ -256,7 +256,7 @@ impl Figure for Bars {
             let chart = json!({
                 "kind": "bars",
                 "scale": if panel.by_ratios() { Scale::Log } else { Scale::Linear },
-                "value_label": panel.x_label,
+                "value_label": raised(&panel.x_label),
                 "categories": panel.names,
                 "series": series.collect::<Vec<_>>(),
             });

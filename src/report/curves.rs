@@ -8,7 +8,7 @@ use serde_json::json;
 use super::axis::{Axis, Labels, Plot, draw_legend, extent, legend_rows};
 use super::canvas::{Align, Type, draw_to_file};
 use super::html::thin::{POINTS, picked, thinned};
-use super::html::{Numbers, refused};
+use super::html::{Numbers, raised, refused};
 use super::style::{INK, LABEL_PX, TICK_PX, series_colour, significant, viridis, with_unit};
 use super::{Figure, HtmlReport};
 use crate::{Error, Result};
@@ -318,8 +318,8 @@ impl Figure for Curves {
             });
             let chart = json!({
                 "kind": "curves",
-                "x_label": panel.x_label,
-                "y_label": panel.y_label,
+                "x_label": raised(&panel.x_label),
+                "y_label": raised(&panel.y_label),
                 "x_scale": panel.scales[0],
                 "y_scale": panel.scales[1],
                 "y_range": panel.y_range,

@@ -2,8 +2,8 @@
 
 use super::axis::{Axis, Labels, Plot, extent};
 use super::canvas::{Align, Canvas, Type, draw_to_file};
-use super::html::Numbers;
 use super::html::thin::picked;
+use super::html::{Numbers, raised};
 use super::style::{FAINT_INK, INK, LABEL_PX, TICK_PX, VERMILLION, WHITE, significant, viridis};
 use super::{Figure, HtmlReport};
 use crate::{Error, Result};
@@ -102,9 +102,9 @@ impl Figure for Surface {
         let marked = self.marks.iter().map(|(name, [x, y])| (x, y, name));
         let chart = json!({
             "kind": "surface",
-            "x_label": self.x_label,
-            "y_label": self.y_label,
-            "value_label": self.z_label,
+            "x_label": raised(&self.x_label),
+            "y_label": raised(&self.y_label),
+            "value_label": raised(&self.z_label),
             "x": Numbers::new(picked(&self.x, &columns)),
             "y": Numbers::new(picked(&self.y, &rows)),
             "values": rows.iter().map(row).collect::<Vec<_>>(),

@@ -3,7 +3,7 @@
 use crate::config::kinds::{Shared, shared};
 use crate::config::settings::{Declared, Flag, Role};
 use crate::error::Result;
-use crate::evaluate::replay::{CHANNEL_NAMES, open_evaluator};
+use crate::evaluate::replay::{CHANNEL_LABELS, CHANNEL_NAMES, open_evaluator};
 use crate::evaluate::{Evaluator, add_failures};
 use crate::study::framework::journal::{Journal, Recorder};
 use crate::study::framework::{Inputs, Progress, RunRecord, Study, Watch, Work};
@@ -55,6 +55,15 @@ pub(in crate::study) fn set_up_channels(
     })?;
     setup.replay.start_as_base_drives();
     Ok(setup)
+}
+
+/// What a cost is of, in words.
+pub(in crate::study) fn of_cost(objective: &str) -> &str {
+    match CHANNEL_NAMES.iter().position(|name| *name == objective) {
+        Some(channel) => CHANNEL_LABELS[channel],
+        None if objective == "all" => "all channels",
+        None => objective,
+    }
 }
 
 /// The ranges of the parameters about the base car's values.

@@ -10,7 +10,7 @@ use super::channel_map::{Axle, ChannelMap, Mapped};
 use super::derived::{acceleration, acceleration_span, product};
 use super::laps::{LEAST_M, Lap, Marks, restarts};
 use super::log::{Log, LogOptions};
-use super::path::start_line;
+use super::path::{STANDING_MPS, start_line};
 use super::recording::{Channel, Clock, Format, Recording, Unreadable};
 use super::resample::{Grid, check_times, onto, uniform_interval};
 use super::role::Role;
@@ -18,9 +18,6 @@ use super::statistics::derivative;
 use super::text::shown;
 use super::units::Quantity;
 use crate::{Error, Place, Result};
-
-/// Speed (m/s) up to which a heading from GPS is noise.
-const STANDING_MPS: f64 = 2.0;
 
 /// A mapped channel in SI, with its times.
 pub(super) struct Signal<'a> {

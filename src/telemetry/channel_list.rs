@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::channel_map::{ChannelMap, Mapped};
+use super::channel_map::{ChannelMap, Mapped, of_positions};
 use super::recording::{Channel, Clock, Recording};
 use super::role::Role;
 use super::units::Unit;
@@ -179,7 +179,9 @@ impl ChannelList {
              # bridge_gaps_s = 0.2             # longest gap that a straight line bridges\n\n",
             quoted(&self.source)
         );
-        let played = |role: Role| self.channels.iter().find(|c| c.role == Some(role));
+        // What positions make is made anew.
+        let of_log = |c: &&ListedChannel| c.role.and_then(of_positions) != Some(c.name.as_str());
+        let played = |role: Role| self.channels.iter().filter(of_log).find(|c| c.role == Some(role));
         for role in Role::ALL {
             if let Some(channel) = played(role) {
                 let _ = writeln!(text, "[channels.{}]", role.key());
@@ -261,6 +263,7 @@ fn listed(channel: &Channel, taken: Option<&Mapped<'_>>) -> ListedChannel {
         unreadable: channel.values.iter().filter(|v| !v.is_finite()).count(),
         role: taken.map(|m| m.role),
         why: match taken {
+            Some(m) if m.is_of_positions() => "made of the positions",
             Some(m) if m.declared => "by the channel map",
             Some(_) => "by its name",
             None => "-",

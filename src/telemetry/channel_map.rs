@@ -3,13 +3,16 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::expression::Expression;
-use super::recording::{Channel, Recording};
+use super::path;
+use super::recording::{Channel, Clock, Recording};
 use super::role::Role;
+use super::ros;
 use super::text::shown;
 use super::units::Unit;
 use crate::config::{line_of, read_text, refused};
@@ -105,8 +108,15 @@ pub struct Mapped<'a> {
     pub sign: Option<f64>,
     /// The delay the map declares, s.
     pub delay_s: Option<f64>,
-    /// Whether the map names the channel; else it was found by its usual name.
+    /// Whether the map names the channel; else it was found by its usual name, or is made of positions.
     pub declared: bool,
+}
+
+impl Mapped<'_> {
+    /// Whether its channel is made of positions.
+    pub(super) fn is_of_positions(&self) -> bool {
+        of_positions(self.role) == Some(self.channel.name.as_str())
+    }
 }
 
 impl ChannelMap {
@@ -218,7 +228,8 @@ impl ChannelMap {
         Some([front, self.rear_rolling_radius_m.unwrap_or(front)])
     }
 
-    /// Finds the channel of each role. A heading is left out where a yaw rate is logged.
+    /// Finds the channel of each role. A heading is left out where a yaw rate is logged. A log of positions has a heading once its
+    /// samples are read.
     ///
     /// # Errors
     /// [`Error::Input`] when a channel the map names is not in the recording, a required role finds no channel, or a
@@ -230,7 +241,8 @@ impl ChannelMap {
             match self.find(role, recording)? {
                 Some(_) if role == Role::Heading && turns() => {}
                 Some(found) => mapped.push(found),
-                None if role == Role::YawRate && self.find(Role::Heading, recording)?.is_some() => {}
+                None if role == Role::YawRate
+                    && (self.find(Role::Heading, recording)?.is_some() || self.has_positions(recording)) => {}
                 None if role.required() => return Err(Self::none_found(role, recording)),
                 None => {}
             }
@@ -267,7 +279,9 @@ impl ChannelMap {
                 )
             })?),
             // A column without a number in it, as of lap numbers where no line is set, is none.
-            None => guess(role, recording).filter(|c| role.of_motion() || !c.is_blank()),
+            None => guess(role, recording)
+                .filter(|c| role.of_motion() || !c.is_blank())
+                .or_else(|| recording.channel(of_positions(role)?)),
         };
         let Some(channel) = found else {
             return match entry {
@@ -310,7 +324,8 @@ impl ChannelMap {
         }))
     }
 
-    /// The recording with the channels that the map's expressions make of it.
+    /// The recording with the channels that the map's expressions make of it, and with heading and speed of its positions where a
+    /// log of steering has neither yaw rate nor heading, or no speed.
     ///
     /// # Errors
     /// [`Error::Input`] naming the map, the key, the expression and what is no channel of the recording.
@@ -325,13 +340,59 @@ impl ChannelMap {
                 }
             }
         }
-        Ok(if made.is_empty() {
-            Cow::Borrowed(recording)
-        } else {
-            let mut with = recording.clone();
-            with.channels.extend(made);
-            Cow::Owned(with)
-        })
+        let mut with = Cow::Borrowed(recording);
+        if !made.is_empty() {
+            with.to_mut().channels.extend(made);
+        }
+        let made = self.of_positions(&with)?;
+        if !made.is_empty() {
+            with.to_mut().channels.extend(made);
+        }
+        Ok(with)
+    }
+
+    /// What a log of steering lacks and its positions tell.
+    fn of_positions(&self, recording: &Recording) -> Result<Vec<Channel>> {
+        // What is wrong with a channel is told where it is used.
+        let lacks = |role| matches!(self.find(role, recording), Ok(None));
+        let undriven = match self.speed_axle {
+            Axle::Front => [Role::WheelSpeedFl, Role::WheelSpeedFr],
+            Axle::Rear => [Role::WheelSpeedRl, Role::WheelSpeedRr],
+        };
+        let heading = lacks(Role::YawRate) && lacks(Role::Heading);
+        let speed = lacks(Role::Vx) && undriven.into_iter().any(lacks);
+        if !(heading || speed) || lacks(Role::Steer) || !self.has_positions(recording) {
+            return Ok(Vec::new());
+        }
+        let Some(path) = path::Path::of(recording, self)? else {
+            return Ok(Vec::new());
+        };
+        let motion = path.motion();
+        let channel = |role, values| {
+            let role: Role = role;
+            Some(Channel {
+                name: of_positions(role)?.to_owned(),
+                unit: role.si_unit().to_owned(),
+                clock: Clock::Times(Arc::clone(&motion.times_s)),
+                values,
+                unreadable: None,
+                lines: None,
+            })
+        };
+        let made = [
+            heading.then(|| channel(Role::Heading, motion.headings_rad.clone())),
+            speed.then(|| channel(Role::Vx, motion.speeds_mps.clone())),
+        ];
+        Ok(made.into_iter().flatten().flatten().collect())
+    }
+
+    /// Whether a recording has channels of positions.
+    fn has_positions(&self, recording: &Recording) -> bool {
+        let both = |roles: [Role; 2]| {
+            let mut found = roles.into_iter().map(|role| self.find(role, recording));
+            found.all(|found| found.is_ok_and(|found| found.is_some()))
+        };
+        both([Role::Latitude, Role::Longitude]) || both([Role::X, Role::Y])
     }
 
     /// Which of a recording's channels a log is made of.
@@ -351,6 +412,15 @@ impl ChannelMap {
             }
         }
         Ok(chosen)
+    }
+}
+
+/// The name of the channel that positions make for a role.
+pub(super) fn of_positions(role: Role) -> Option<&'static str> {
+    match role {
+        Role::Vx => Some("speed of the positions"),
+        Role::Heading => Some("heading of the positions"),
+        _ => None,
     }
 }
 
@@ -390,10 +460,20 @@ fn guess(role: Role, recording: &Recording) -> Option<&Channel> {
         let mut all = recording.channels.iter().filter(of_part);
         all.next().filter(|_| all.next().is_none())
     };
+    // The end of a path is a name if no other path ends so.
+    let path = || {
+        let mut names = role.usual_names().iter().chain(role.names_with_unit());
+        names.find_map(|name| {
+            let ends_so = |c: &&Channel| ros::tail(&c.name).is_some_and(|tail| key(&tail.concat()) == *name);
+            let mut all = recording.channels.iter().filter(ends_so).filter(fits);
+            all.next().filter(|_| all.next().is_none())
+        })
+    };
     role.usual_names()
         .iter()
         .find_map(|name| called(name))
         .or_else(|| with_unit.find_map(|name| called(name).filter(fits)))
+        .or_else(path)
         .or_else(only)
 }
 

@@ -5,13 +5,24 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::recording::{Format, Metadata, Reading, Recording};
+use super::ros;
 use super::table::Table;
 use super::text::{Rows, shown};
 use super::units::{Quantity, Unit};
 use crate::{Error, Place, Result};
 
 /// Names of the column of times, in lower case and without anything but letters.
-const TIMES: [&str; 6] = ["time", "timestamp", "t", "elapsedtime", "logtime", "sessiontime"];
+const TIMES: [&str; 7] = [
+    "time",
+    "timestamp",
+    "t",
+    "elapsedtime",
+    "logtime",
+    "sessiontime",
+    "rosbagtimestamp",
+];
+/// Times since 1970 of at least these are in these units: as seconds they would be thousands of years off.
+const SINCE_1970: [(f64, &str); 3] = [(1e17, "ns"), (1e14, "us"), (1e11, "ms")];
 /// Rows that may come before the header.
 const MOST_ROWS_BEFORE: usize = 64;
 
@@ -62,6 +73,13 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
         .first()
         .and_then(|row| row.cells.iter().rposition(|cell| !cell.is_empty()));
     heads.truncate(named.max(filled).map_or(0, |last| last + 1));
+    ros::add_units(&mut heads);
+    let began = body.first().and_then(|row| row.cell(time).parse::<f64>().ok());
+    if let (Some(began), true) = (began, heads[time].1.is_empty())
+        && let Some((_, unit)) = SINCE_1970.iter().find(|(least, _)| began >= *least)
+    {
+        heads[time].1 = (*unit).to_owned();
+    }
     let names = unique(heads.iter().map(|(name, _)| name.as_str()));
     let units: Vec<String> = heads.into_iter().map(|(_, unit)| unit).collect();
     let second = Unit::parse(&units[time]).filter(|unit| unit.quantity == Quantity::Time);
@@ -70,7 +88,7 @@ pub(super) fn parse(text: &str, path: &Path, reading: &Reading<'_>) -> Result<Re
             path,
             Place::line(line).channel(&names[time]),
             shown(&units[time]),
-            "a unit of time (s, ms, min)",
+            Quantity::Time.described().replacen("a time", "a unit of time", 1),
         ));
     }
     let mut table = Table::new(path, text, (names, units), time, (Format::Headed, reading))?;
@@ -172,6 +190,43 @@ mod tests {
             assert_eq!((ay.name.as_str(), ay.unit.as_str()), ("ay", ""), "{text}");
             assert_eq!([vx.time_s(0), vx.time_s(1)], [0.0, 0.5], "{text}");
         }
+    }
+
+    /// As `rostopic echo -p` and PlotJuggler write them: paths, times since 1970, and no units.
+    #[test]
+    fn messages_of_ros_are_in_si() {
+        use crate::telemetry::{ChannelList, ChannelMap, Role};
+        for (text, steer) in [
+            (
+                "%time,field.header.seq,field.twist.twist.linear.x,field.twist.twist.angular.z,field.linear_acceleration.y,\
+                 field.steering_angle\n1600000000000000000,1,12,0.1,1.2,0.02\n1600000000500000000,2,13,0.2,2.6,0.03\n",
+                "field.steering_angle",
+            ),
+            (
+                "__time,/odom/twist/twist/linear/x,/imu/angular_velocity/z,/imu/linear_acceleration/y,/steering_angle\n\
+                 1600000000.0,12,0.1,1.2,0.02\n1600000000.5,13,0.2,2.6,0.03\n",
+                "/steering_angle",
+            ),
+        ] {
+            let recording = read(text).unwrap();
+            let vx = &recording.channels[recording.channels.len() - 4];
+            assert_eq!(vx.time_s(1) - vx.time_s(0), 0.5, "{text}");
+            let list = ChannelList::of(&recording, &ChannelMap::default());
+            let played = |role| {
+                let found = list.channels.iter().find(|c| c.role == Some(role));
+                found.map(|c| (c.name.as_str(), c.unit.as_str()))
+            };
+            assert_eq!(played(Role::Steer), Some((steer, "rad")));
+            assert_eq!(played(Role::Vx).unwrap().1, "m/s");
+            assert_eq!(played(Role::YawRate).unwrap().1, "rad/s");
+            assert_eq!(played(Role::Ay).unwrap().1, "m/s^2");
+        }
+        // Two that could be it are for the user to choose from, and a dot makes no message of ROS.
+        let twice = read("__time,/a/twist/linear/x,/b/twist/linear/x\n0,1,2\n1,1,2\n").unwrap();
+        let list = ChannelList::of(&twice, &ChannelMap::default());
+        let vx = list.missing.iter().find(|m| m.role == Role::Vx).unwrap();
+        assert_eq!(vx.candidates.len(), 2);
+        assert_eq!(read("t,car.speed\n0,1\n1,2\n").unwrap().channels[0].unit, "");
     }
 
     #[test]

@@ -96,11 +96,15 @@ impl Log {
             .iter()
             .filter(|m| !m.declared && recording.format != Format::Native)
         {
-            calibration.notes.push(format!(
-                "{}: channel {}, by its name",
-                m.role.key(),
-                shown(&m.channel.name)
-            ));
+            calibration.notes.push(if m.is_of_positions() {
+                format!("{}: not logged; it is that of the positions", m.role.key())
+            } else {
+                format!(
+                    "{}: channel {}, by its name",
+                    m.role.key(),
+                    shown(&m.channel.name)
+                )
+            });
         }
         let recorded: u64 = recording.channels.iter().map(|c| c.values.len() as u64).sum();
         let fits = |samples: usize| {

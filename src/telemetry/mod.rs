@@ -39,6 +39,7 @@ mod read;
 mod recording;
 mod resample;
 mod role;
+mod ros;
 mod statistics;
 #[cfg(test)]
 mod synthetic;

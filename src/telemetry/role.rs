@@ -161,8 +161,8 @@ impl Role {
         }
     }
 
-    /// Whether a log cannot do without it. Ground speed can be made of wheel speeds and wheel speeds of ground speed, accelerations
-    /// of speed and yaw rate, and that of the heading.
+    /// Whether a log cannot do without it. Ground speed can be made of wheel speeds or positions and wheel speeds of ground speed,
+    /// accelerations of speed and yaw rate, and that of the heading or of positions.
     pub fn required(self) -> bool {
         matches!(self, Self::Steer | Self::YawRate)
     }
@@ -218,6 +218,7 @@ impl Role {
                 "steer",
                 "steerwheelangle",
                 "steeringwheel",
+                "steeringtireangle",
                 "steerwheel",
                 "handwheelangle",
                 "swa",
@@ -352,10 +353,25 @@ impl Role {
             Self::WheelSpeedRl => wheels!("rl", "lr", "rearleft", "leftrear"),
             Self::WheelSpeedRr => wheels!("rr", "rearright", "rightrear"),
             Self::Steer => &["handwheel", "roadwheelangle", "swangle"],
-            Self::Vx => &["vel", "velocityx", "longitudinalvelocity", "gpsvelocity", "v"],
-            Self::Ax => &["longitudinal", "inline"],
-            Self::Ay => &["lateral"],
-            Self::YawRate => &["yaw", "rotationz", "angularvelocityz", "omegaz", "wz"],
+            Self::Vx => &[
+                "vel",
+                "velocityx",
+                "longitudinalvelocity",
+                "gpsvelocity",
+                "v",
+                "linearx",
+            ],
+            Self::Ax => &["longitudinal", "inline", "linearaccelerationx"],
+            Self::Ay => &["lateral", "linearaccelerationy"],
+            Self::YawRate => &[
+                "yaw",
+                "rotationz",
+                "angularvelocityz",
+                "omegaz",
+                "wz",
+                "angularz",
+                "headingrate",
+            ],
             _ => &[],
         }
     }

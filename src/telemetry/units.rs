@@ -64,6 +64,7 @@ impl Unit {
             "s" | "sec" | "secs" | "second" | "seconds" => (Time, 1.0),
             "ms" | "msec" => (Time, 1e-3),
             "us" | "µs" | "μs" => (Time, 1e-6),
+            "ns" => (Time, 1e-9),
             "min" => (Time, 60.0),
             "m" | "metre" | "meter" | "metres" | "meters" => (Distance, 1.0),
             "km" => (Distance, 1e3),

@@ -214,6 +214,14 @@ impl Car {
         coefficient * self.chassis.gravity
     }
 
+    /// Force of a hybrid's MGU-K at the wheels (N) at a speed (m/s) above zero, at its greatest power in the gear that the engine is in;
+    /// none without the machine, and beyond the last engine speed.
+    pub fn motor_n(&self, speed_mps: f64) -> Option<f64> {
+        let (hybrid, powertrain) = self.hybrid.as_ref().zip(self.powertrain.as_ref())?;
+        let gear = powertrain.gear(speed_mps, self.chassis.radius_rear)?;
+        Some(hybrid.mgu_k.power_at(gear.engine_speed_rpm) * powertrain.efficiency / speed_mps)
+    }
+
     /// Mass that the engine accelerates over that of the car; 1 without a powertrain.
     pub fn rotating_mass_factor(&self) -> f64 {
         self.powertrain.as_ref().map_or(1.0, |p| p.rotating_mass_factor)

@@ -233,7 +233,8 @@ impl CarFacts {
         }
     }
 
-    /// The factor on the base tyre's friction with which the car corners at `corner_g`, by regula falsi.
+    /// The factor on the base tyre's friction with which the car corners at `corner_g`. It is enclosed and then halved, since cornering
+    /// may go with more than the square of the friction where a wheel lifts.
     fn scale_for(&self, corner_g: f64, car: &Car) -> Result<f64> {
         let lift = air_w(self.corner_kmh / 3.6) / (self.corner_kmh / 3.6) * self.downforce_area_m2;
         let half_track = 0.25 * (self.front_track_m + self.rear_track_m);
@@ -251,17 +252,27 @@ impl CarFacts {
             corner_g_of(&car, self.corner_kmh)
         };
         let at_rest = friction_at_rest(car);
-        let mut scale = 1.0;
-        for _ in 0..40 {
+        let (mut scale, mut less, mut more) = (1.0f64, None::<f64>, None::<f64>);
+        for _ in 0..60 {
             let found = reached(scale);
             if (found / corner_g - 1.0).abs() < 1e-3 {
                 return Ok(scale);
             }
-            // Cornering is nearly in proportion to the friction.
-            scale *= (corner_g / found).clamp(0.5, 2.0);
+            *(if found < corner_g { &mut less } else { &mut more }) = Some(scale);
+            scale = match (less, more) {
+                (Some(less), Some(more)) => (less * more).sqrt(),
+                (Some(_), None) => scale * (corner_g / found).clamp(1.05, 2.0),
+                (None, _) => scale * (corner_g / found).clamp(0.5, 0.95),
+            };
             if found <= 0.0 || scale * at_rest > MOST_FRICTION {
                 break;
             }
+        }
+        if more.is_some() {
+            return Err(Error::Study(format!(
+                "no friction brings {} to {corner_g} g at {} km/h: a wheel lifts there, and it corners less or more",
+                self.name, self.corner_kmh
+            )));
         }
         Err(Error::Study(format!(
             "no tyre with a friction of up to {MOST_FRICTION} brings {} to {corner_g} g at {} km/h: ask for less, for a lower centre of \
@@ -356,9 +367,18 @@ mod tests {
     use super::*;
 
     /// A kart, a truck, an open-wheeler with much downforce and a road car.
-    fn cars() -> [CarFacts; 4] {
+    fn cars() -> [CarFacts; 5] {
         let facts = CarFacts::default;
         [
+            // A wheel lifts, from where on cornering goes with the square of the friction and more.
+            CarFacts {
+                mass_kg: 160.0,
+                wheelbase_m: 1.04,
+                corner_g: Some(1.6),
+                power_kw: 22.0,
+                top_speed_kmh: 115.0,
+                ..facts()
+            },
             CarFacts {
                 mass_kg: 160.0,
                 front_weight_percent: 43.0,

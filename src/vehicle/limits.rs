@@ -96,6 +96,8 @@ pub struct EnvelopeAtSpeed {
     pub lost_in_bends_mps2: Vec<f64>,
     /// Greatest acceleration by the engine in its best gear, before drag (m/s^2).
     pub engine_mps2: f64,
+    /// The same with a hybrid's motor beside the engine.
+    pub with_motor_mps2: Option<f64>,
 }
 
 /// How the car steers at small lateral acceleration (R. Gillespie, *Fundamentals of Vehicle Dynamics*, 1992, ch. 6).
@@ -276,6 +278,7 @@ fn limits_at(car: &Car, speeds: &[f64]) -> Result<Vec<EnvelopeAtSpeed>> {
         let traction_mps2 = steady.greatest_traction(speed);
         let drag_mps2 = steady.drag(speed) + rolling;
         let engine_mps2 = accelerated(force(speed), drag_mps2) + drag_mps2;
+        let both = |motor_n: f64| accelerated(force(speed) + motor_n, drag_mps2) + drag_mps2;
         let ax_drive_mps2 = traction_mps2.min(engine_mps2);
         // What the wheels take to roll does not reach the road.
         let engine = engine_mps2 - rolling;
@@ -312,6 +315,7 @@ fn limits_at(car: &Car, speeds: &[f64]) -> Result<Vec<EnvelopeAtSpeed>> {
             traction_in_bends_mps2,
             lost_in_bends_mps2,
             engine_mps2,
+            with_motor_mps2: car.motor_n(speed).map(both),
         }
     };
     Ok(speeds.par_iter().map(at).collect())
@@ -448,6 +452,23 @@ mod tests {
                 .all(|s| s.row.ax_drive_mps2 <= s.traction_mps2)
         );
         assert!(limits.handling.stability_factor_s2_per_m2.abs() < 0.01);
+        assert!(limits.speeds.iter().all(|s| s.with_motor_mps2.is_none()));
+    }
+
+    /// 120 kW at its shaft, less what the gearbox takes.
+    #[test]
+    fn a_hybrids_motor_adds_its_power_to_the_engines() {
+        let car = Car::bundled_hybrid().unwrap();
+        let limits = car_envelope(&car, &SpeedRange::USUAL).unwrap();
+        let efficiency = car.powertrain.as_ref().unwrap().efficiency;
+        let powers = limits.speeds.iter().filter_map(|s| {
+            let gained = s.with_motor_mps2? - s.engine_mps2;
+            Some(gained * car.chassis.mass * s.row.v_mps / efficiency)
+        });
+        let powers: Vec<f64> = powers.collect();
+        let greatest = powers.iter().copied().fold(0.0, f64::max);
+        assert!((greatest / 120e3 - 1.0).abs() < 1e-9, "{greatest} W");
+        assert!(powers.len() > 5 && powers.iter().all(|p| *p > 0.0), "{powers:?}");
     }
 
     /// The rear axle carries its share of the lateral force whatever it drives with. At 0.8 of the limit the ellipse of the whole car

@@ -37,6 +37,11 @@
     findings.in_g =
       measured && [...measured.closest("table").tBodies[0].rows].map((row) => row.cells[column].textContent);
     findings.lap_units = [...document.querySelectorAll(".readout .unit")].map((unit) => unit.textContent.trim());
+    const drawn = [...document.querySelectorAll("[_echarts_instance_]")].map((e) => echarts.getInstanceByDom(e).getOption());
+    const axes = drawn.flatMap((option) => [...(option.xAxis ?? []), ...(option.yAxis ?? [])]);
+    findings.axes_in_g = axes.filter((axis) => /\(g\)$/.test(axis.name ?? "")).length;
+    const bars = drawn.flatMap((option) => option.series).filter((series) => series.type === "bar");
+    findings.greatest_bar = Math.max(...bars.flatMap((series) => series.data.map((d) => d?.value ?? d)));
     findings.switch = document.querySelector("header .units")?.textContent ?? null;
     findings.tables = document.querySelectorAll(".table table").length;
 

@@ -4,7 +4,7 @@ use crate::common::harness::browser;
 use glam::DVec2;
 use lapswarm::report::{
     BarPanel, Bars, Curves, Front, HtmlReport, LapLine, LapView, Levels, Panel, ParameterRow, Parameters,
-    Road, Scale, Surface, Table,
+    Road, Scale, Surface, Table, with_unit,
 };
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -102,7 +102,7 @@ fn everything(path: &Path) {
     let steps: Vec<f64> = (0..50).map(f64::from).collect();
     let panel = Panel::new(HOSTILE)
         .x(HOSTILE, "")
-        .y(HOSTILE, "")
+        .y(HOSTILE, "m/s^2")
         .scales(Scale::Linear, Scale::Log);
     let panel = (0..3).fold(panel, |panel, k| {
         let y: Vec<f64> = steps.iter().map(|i| i * f64::from(k) + 1.0).collect();
@@ -155,7 +155,7 @@ fn everything(path: &Path) {
     };
     page.place(&surface).unwrap();
     let bars = ["alone", HOSTILE].into_iter().fold(
-        BarPanel::new(HOSTILE, HOSTILE, [HOSTILE, "plain"]),
+        BarPanel::new(HOSTILE, with_unit(HOSTILE, "m/s^2"), [HOSTILE, "plain"]),
         |panel, label| panel.with_intervals(label, [0.3, 0.6], [[0.2, 0.4], [0.5, 0.65]]),
     );
     page.place(&Bars::new(HOSTILE, [bars])).unwrap();
@@ -269,6 +269,10 @@ fn pages_work_in_a_browser() {
         "{findings}"
     );
     assert_eq!(findings["lap_units"], serde_json::json!(["g"]), "{findings}");
+    // The curves' and the bars'. The greatest bar is 0.6 m/s^2.
+    assert_eq!(findings["axes_in_g"], 2, "{findings}");
+    let bar_g = findings["greatest_bar"].as_f64().unwrap();
+    assert!((bar_g - 0.6 / 9.80665).abs() < 1e-4, "{findings}");
     assert!(
         findings["switch"]
             .as_str()

@@ -290,14 +290,8 @@ fn standing_start(car: &Car, powertrain: &Powertrain) -> Chart {
     let rotating = powertrain.rotating_mass_factor;
     let gains = |step: f64, motor: bool| {
         let v = (top * step / steps as f64).max(SLOWEST_MPS);
-        let gear = powertrain.gear(v, radius);
-        let motor_n = match (&car.hybrid, gear) {
-            (Some(hybrid), Some(gear)) if motor => {
-                hybrid.mgu_k.power_at(gear.engine_speed_rpm) * powertrain.efficiency / v
-            }
-            _ => 0.0,
-        };
-        let pull = (gear.map_or(0.0, |gear| gear.force_n) + motor_n) / mass;
+        let motor_n = car.motor_n(v).filter(|_| motor).unwrap_or(0.0);
+        let pull = (powertrain.wheel_force(v, radius) + motor_n) / mass;
         let drag = steady.drag(v);
         let driven = (pull - car.rolling_mps2() + (rotating - 1.0) * drag) / rotating;
         at(&traction, step).min(driven) - drag

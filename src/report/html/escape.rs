@@ -20,9 +20,26 @@ pub(super) fn html(text: &str) -> String {
     safe
 }
 
-/// A unit with its exponents raised, as in `m/s\u{b2}` for `m/s^2`; others as they are.
+/// Text with what stands between backticks as code.
+pub(super) fn prose(text: &str) -> String {
+    let safe = html(text);
+    let parts: Vec<&str> = safe.split('`').collect();
+    // An odd backtick is one.
+    if parts.len().is_multiple_of(2) {
+        return safe;
+    }
+    let told = parts.iter().enumerate().map(|(i, part)| match i % 2 {
+        0 => (*part).to_owned(),
+        _ => format!("<code>{part}</code>"),
+    });
+    told.collect()
+}
+
+/// A unit, or a label that ends in one, with its exponents raised, as in `m/s\u{b2}` for `m/s^2`; others as they are.
 pub(in crate::report) fn raised(unit: &str) -> String {
-    unit.replace("^2", "\u{b2}").replace("^3", "\u{b3}")
+    unit.replace("^2", "\u{b2}")
+        .replace("^3", "\u{b3}")
+        .replace("^4", "\u{2074}")
 }
 
 /// JSON that may stand inside a `<script>` element: no character in it can end the element, open a comment or break a
@@ -82,6 +99,15 @@ impl Serialize for Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn code_in_text_is_code_and_no_markup() {
+        assert_eq!(
+            prose("write `--log <F>` here"),
+            "write <code>--log &lt;F&gt;</code> here"
+        );
+        assert_eq!(prose("a ` alone"), "a ` alone");
+    }
 
     #[test]
     fn markup_in_text_stays_text() {

@@ -15,7 +15,7 @@ use super::table::{Cells, Column, plain_digits};
 use super::{CornerLap, Figure, Table, corner_table};
 use crate::files::write_whole;
 use crate::{Error, Result};
-use escape::{html, json_in_script};
+use escape::{html, json_in_script, prose};
 use serde_json::Value;
 use std::path::Path;
 
@@ -98,7 +98,7 @@ impl HtmlReport {
     /// A paragraph between charts.
     pub fn paragraph(&mut self, text: &str) {
         if !text.is_empty() {
-            self.push(format!("<p>{}</p>\n", html(text)));
+            self.push(format!("<p>{}</p>\n", prose(text)));
         }
     }
 
@@ -279,7 +279,7 @@ fn noted(text: &str) -> String {
     if text.is_empty() {
         String::new()
     } else {
-        format!("<p class=\"note\">{}</p>\n", html(text))
+        format!("<p class=\"note\">{}</p>\n", prose(text))
     }
 }
 

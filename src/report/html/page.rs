@@ -1,7 +1,7 @@
 //! The page around the body.
 
 use super::HtmlReport;
-use super::escape::html;
+use super::escape::{html, prose};
 
 const STYLE: &str = include_str!("page/page.css");
 const LIBRARY: &str = include_str!("vendor/echarts.min.js");
@@ -69,7 +69,7 @@ fn body(report: &HtmlReport, page: &mut String) {
 fn summary(report: &HtmlReport) -> String {
     let mut text = String::from("<section class=\"summary\">\n");
     for sentence in &report.sentences {
-        text += &format!("<p>{}</p>\n", html(sentence));
+        text += &format!("<p>{}</p>\n", prose(sentence));
     }
     if !report.tiles.is_empty() {
         text += "<dl class=\"tiles\">\n";
@@ -87,7 +87,7 @@ fn summary(report: &HtmlReport) -> String {
         text += "</dl>\n";
     }
     for warning in &report.warnings {
-        text += &format!("<p class=\"warning\">{}</p>\n", html(warning));
+        text += &format!("<p class=\"warning\">{}</p>\n", prose(warning));
     }
     text += "</section>\n";
     let contents = report.sections.iter().enumerate();

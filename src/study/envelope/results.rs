@@ -295,7 +295,9 @@ fn handling_figure(rows: &[SmallSteering], car: &str) -> Curves {
         let points = rows[i].eigenvalues_1ps.map(|[re, im]| (re, im));
         roots = roots.dots(format!("{:.0} m/s", v[i]), points);
     }
-    Curves::new(format!("Small steering: {car}"), [gain, factor, damping, roots])
+    let panels = [gain, factor, damping, roots].into_iter();
+    // No motion of a car may swing.
+    Curves::new(format!("Small steering: {car}"), panels.filter(Panel::has_points))
 }
 
 /// The limit at a speed once round, from full drive over full cornering to full braking and back: lateral and longitudinal
@@ -340,7 +342,7 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
         let (across, along) = around(&row, &limits.envelope);
         diagram = diagram.shaded(shade, "", &across, &along);
     }
-    let limits = Panel::new("Limits of the tyres and the engine")
+    let limits_panel = Panel::new("Limits of the tyres and the engine")
         .x("speed", "m/s")
         .y("acceleration", "m/s\u{b2}")
         .curve("lateral", &v, &over_speed(&|s| s.row.ay_mps2))
@@ -348,9 +350,15 @@ pub fn envelope_figure(limits: &CarEnvelope, car: &str) -> Curves {
         .curve("traction", &v, &over_speed(&|s| s.traction_mps2))
         .curve("engine", &v, &over_speed(&|s| s.engine_mps2))
         .curve("drag", &v, &over_speed(&|s| s.row.drag_mps2));
+    let limits_panel = if speeds.iter().any(|s| s.with_motor_mps2.is_some()) {
+        let both = over_speed(&|s| s.with_motor_mps2.unwrap_or(f64::NAN));
+        limits_panel.curve("engine and motor", &v, &both)
+    } else {
+        limits_panel
+    };
     Curves::new(
         format!("g-g-v envelope: {car}"),
-        [cornering, limits, diagram, sideslip],
+        [cornering, limits_panel, diagram, sideslip],
     )
 }
 
@@ -454,8 +462,10 @@ fn speeds_table(limits: &CarEnvelope) -> Table<'static> {
         .number("drive", "m/s^2", |s| s.row.ax_drive_mps2)
         .number("traction", "m/s^2", |s| s.traction_mps2)
         .number("engine", "m/s^2", |s| s.engine_mps2)
+        .number("engine and motor", "m/s^2", |s| s.with_motor_mps2)
         .number("drag", "m/s^2", |s| s.row.drag_mps2)
         .table()
+        .without_empty()
 }
 
 /// What the surface is, in words.
@@ -541,6 +551,7 @@ fn surface_figure(surface: &SteadySurface, car: &str) -> Option<Surface> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::Figure;
 
     #[test]
     fn limits_beyond_the_log_are_marked() {
@@ -572,5 +583,26 @@ mod tests {
             table.contains("cornering, braking") && table.contains("14"),
             "{table}"
         );
+    }
+
+    /// A car that leans far on soft springs with much damping has no motion that swings. It has a picture all the same.
+    #[test]
+    fn a_car_that_nowhere_swings_is_drawn() {
+        let row = SmallSteering {
+            v_mps: 20.0,
+            yaw_rate_gain_1ps: 5.0,
+            ay_gain_mps2: 100.0,
+            sideslip_gain: 0.1,
+            stability_factor_s2_per_m2: 1e-3,
+            frequency_hz: None,
+            damping_ratio: None,
+            slowest_decay_1ps: 0.5,
+            eigenvalues_1ps: [[-1.0, 0.0], [-2.0, 0.0], [-3.0, 0.0], [-4.0, 0.0]],
+        };
+        let rows = [row, SmallSteering { v_mps: 30.0, ..row }];
+        let folder = tempfile::tempdir().unwrap();
+        handling_figure(&rows, "car")
+            .write_svg(&folder.path().join("handling.svg"))
+            .unwrap();
     }
 }

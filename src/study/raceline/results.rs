@@ -205,6 +205,13 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
                 line.clearance.place()
             ));
         }
+        if let Some(share) = line.gave_way {
+            warnings.push(format!(
+                "{}: the swarm's line left the road between the cross-sections; it gave way by {:.0} % of the way to the reference line",
+                line.name,
+                100.0 * share
+            ));
+        }
         if let Some(lap) = line.fine.lap.as_ref().filter(|lap| lap.beyond_lock > 0) {
             warnings.push(format!(
                 "{}: steering beyond the lock at {} places",

@@ -157,6 +157,8 @@ pub struct ReportedLine {
     pub fine: FineLine,
     /// How close the car comes to the edges.
     pub clearance: Clearance,
+    /// Share of the way to the reference line by which it gave way, where it left the road so far that bending did not help.
+    pub gave_way: Option<f64>,
 }
 
 impl ReportedLine {
@@ -196,6 +198,8 @@ impl ReportedLine {
 
 /// Shares of the way to the reference line by which a line gives way that bending does not bring onto the road.
 const TOWARDS_REFERENCE: [f64; 6] = [0.0025, 0.005, 0.01, 0.02, 0.04, 0.08];
+/// The same for the line of a swarm alone, which may zigzag from cross-section to cross-section.
+const FAR_TOWARDS_REFERENCE: [f64; 3] = [0.16, 0.32, 0.64];
 
 /// The gear that gives most (from 1) at each speed (m/s), on driven wheels of a radius (m); the top gear beyond the last engine speed.
 pub(in crate::study) fn best_gears(powertrain: &Powertrain, radius_m: f64, v_mps: &[f64]) -> Vec<f64> {
@@ -334,12 +338,23 @@ impl Setup {
             return Ok(Some(alpha.to_vec()));
         }
         // Where bending alone does not help, the whole line gives way a little towards the reference line.
-        for share in TOWARDS_REFERENCE {
+        let given_way = self.given_way(alpha, &TOWARDS_REFERENCE, settings)?;
+        Ok(given_way.map(|(line, _)| line))
+    }
+
+    /// The line that has given way towards the reference line by the first of the shares that brings it onto the road, and that share.
+    fn given_way(
+        &self,
+        alpha: &[f64],
+        shares: &[f64],
+        settings: &RacelineSettings,
+    ) -> Result<Option<(Vec<f64>, f64)>> {
+        for share in shares {
             let both = alpha.iter().zip(&self.cross_sections.reference);
             let line: Vec<f64> = both.map(|(a, r)| a + share * (r - a)).collect();
             let (fine, clearances) = self.measured(&line, settings)?;
             if Clearance::least(&fine, &clearances).is_on_road() {
-                return Ok(Some(line));
+                return Ok(Some((line, *share)));
             }
         }
         Ok(None)
@@ -351,7 +366,10 @@ impl Setup {
     /// # Errors
     /// [`Error::Study`] if the line cannot be driven at all.
     pub fn report(&self, name: &str, alpha: &[f64], settings: &RacelineSettings) -> Result<ReportedLine> {
-        let brought_in = self.brought_in(alpha, settings)?;
+        let (mut brought_in, mut gave_way) = (self.brought_in(alpha, settings)?, None);
+        if brought_in.is_none() && !settings.searches_locally() {
+            (brought_in, gave_way) = self.given_way(alpha, &FAR_TOWARDS_REFERENCE, settings)?.unzip();
+        }
         let alpha = brought_in.as_deref().unwrap_or(alpha);
         let problem = self.problem(Parametrisation::sections(), &LineObjective::ALL, settings)?;
         let found = CpuLineEvaluator::new(&problem).evaluate(alpha)?;
@@ -381,6 +399,7 @@ impl Setup {
             alpha: alpha.to_vec(),
             at_cross_sections: found.objectives,
             clearance,
+            gave_way,
             fine,
         })
     }

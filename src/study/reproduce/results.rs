@@ -76,10 +76,13 @@ pub struct Summary {
     pub ended_by: Option<String>,
 }
 
-/// Settings in words.
+/// Settings in words. Keys that change together say their own names, and a key of a table that of the key.
 fn words(group: &Group) -> String {
-    let told: Vec<String> = group.settings.iter().map(|(k, v)| format!("{k} {v}")).collect();
-    told.join(", ")
+    let told = group.settings.iter().map(|(key, value)| match key.as_str() {
+        "together" | "swarm" => value.clone(),
+        key => format!("{} {value}", key.rsplit('.').next().unwrap_or(key)),
+    });
+    told.collect::<Vec<_>>().join(", ")
 }
 
 /// How far a figure is above another (%); rounding is no difference.
@@ -177,8 +180,30 @@ impl TableSummary {
         )
     }
 
-    /// Its figures as columns.
+    /// Its figures as columns: each has its own where all are of the same things, of one run each, and none is published.
     fn columns(&self) -> Table<'static> {
+        let figures = self.figures();
+        let of = |(figure, _): &(&str, &str)| -> Vec<&Compared> {
+            self.rows.iter().filter(|r| r.figure == *figure).collect()
+        };
+        let things =
+            |figure: &(&str, &str)| -> Vec<String> { of(figure).iter().map(|r| r.of.clone()).collect() };
+        let alone = self
+            .rows
+            .iter()
+            .all(|r| r.published.is_none() && spread(r).is_none());
+        if let [first, others @ ..] = &figures[..]
+            && alone
+            && of(first).len() > 1
+            && !others.is_empty()
+            && others.iter().all(|figure| things(figure) == things(first))
+        {
+            let table = Table::new().texts("of", things(first));
+            return figures.iter().fold(table, |table, figure| {
+                let ours: Vec<f64> = of(figure).iter().map(|r| r.median.unwrap_or(f64::NAN)).collect();
+                table.numbers(figure.0, figure.1, ours)
+            });
+        }
         Table::rows(&self.rows)
             .text("of", |r| r.of.clone())
             .text("figure", |r| r.figure.clone())
@@ -192,8 +217,8 @@ impl TableSummary {
             .without_empty()
     }
 
-    /// A panel for each figure of several settings.
-    fn panels(&self) -> Vec<BarPanel> {
+    /// Its figures with their units, in their order.
+    fn figures(&self) -> Vec<(&str, &str)> {
         let mut names: Vec<(&str, &str)> = Vec::new();
         for row in &self.rows {
             let name = (row.figure.as_str(), row.unit.as_str());
@@ -201,6 +226,11 @@ impl TableSummary {
                 names.push(name);
             }
         }
+        names
+    }
+
+    /// A panel for each figure of several settings.
+    fn panels(&self) -> Vec<BarPanel> {
         let panel = |(figure, unit): (&str, &str)| {
             let rows: Vec<&Compared> = self.rows.iter().filter(|r| r.figure == figure).collect();
             let label = if unit.is_empty() {
@@ -225,7 +255,7 @@ impl TableSummary {
             };
             (rows.len() > 1).then_some(panel)
         };
-        names.into_iter().filter_map(panel).collect()
+        self.figures().into_iter().filter_map(panel).collect()
     }
 }
 
@@ -331,7 +361,13 @@ impl Summary {
                     &format!("Chapter {}: {}", chapter.number, item.title),
                     &item.about,
                 );
-                page.table("Published and ours", &table.took(), &table.columns())?;
+                let published = table.rows.iter().any(|r| r.published.is_some());
+                let heading = if published {
+                    "Published and ours"
+                } else {
+                    "Ours; no published figures are at hand"
+                };
+                page.table(heading, &table.took(), &table.columns())?;
                 // Rows of one figure have one sentence.
                 let differing = table.rows.iter().filter(|row| !row.differs.is_empty());
                 let sentences = differing.map(|row| format!("{}: {}", row.figure, row.differs));
@@ -425,5 +461,52 @@ mod tests {
             ..asked("published = 3")
         };
         assert_eq!(compared(&none, &groups)[0].median, None);
+    }
+
+    /// Sites of one run have a row each, as the thesis has them, and settings of sweeps say their own names.
+    #[test]
+    fn figures_of_the_same_things_stand_beside_one_another() {
+        let compared = |of: &str, figure: &str, median: f64| Compared {
+            of: of.to_owned(),
+            figure: figure.to_owned(),
+            unit: "m".to_owned(),
+            published: None,
+            lower_quartile: Some(median),
+            median: Some(median),
+            upper_quartile: Some(median),
+            runs: 1,
+            difference_percent: None,
+            differs: String::new(),
+        };
+        let mut table = TableSummary {
+            chapter: 4,
+            name: "sites".to_owned(),
+            title: "Sites".to_owned(),
+            study: "hybrid".to_owned(),
+            rows: vec![
+                compared("site 1", "from", 10.0),
+                compared("site 2", "from", 30.0),
+                compared("site 1", "to", 20.0),
+                compared("site 2", "to", 40.0),
+            ],
+            runs: 1,
+            evaluations: None,
+            failed_runs: Vec::new(),
+            elapsed_s: 1.0,
+            processor_elapsed_s: 1.0,
+        };
+        let text = table.columns().to_text();
+        let lines: Vec<&str> = text.lines().map(str::trim_end).collect();
+        assert!(lines[0].contains("from") && lines[0].contains("to"), "{text}");
+        assert!(lines[2].contains("10") && lines[2].contains("20"), "{text}");
+        table.rows[3].published = Some(41.0);
+        assert!(table.columns().to_text().contains("published"));
+        let keys = [("swarm.inertia", "0.4"), ("together", "cognitive 1, social 3")];
+        let group = Group {
+            settings: BTreeMap::from(keys.map(|(k, v)| (k.to_owned(), v.to_owned()))),
+            runs: 1,
+            figures: BTreeMap::new(),
+        };
+        assert_eq!(words(&group), "inertia 0.4, cognitive 1, social 3");
     }
 }

@@ -10,6 +10,7 @@ use crate::files::stem;
 use crate::report::{HtmlReport, LapLine, LapView, significant};
 use crate::study::framework::Solved;
 use crate::study::identify::Setup;
+use crate::study::replayed::of_cost;
 use crate::track::Circuit;
 use glam::DVec2;
 use std::path::Path;
@@ -76,11 +77,7 @@ fn head(page: &mut HtmlReport, car: &str, summary: &Summary) {
         if !told.is_empty() {
             page.sentence(format!(
                 "Most of the variance of the cost of {} goes with {}.",
-                if cost == "all" {
-                    "all channels together"
-                } else {
-                    cost
-                },
+                of_cost(cost),
                 told.join(", ")
             ));
         }

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::report::{BarPanel, Bars, Table};
 use crate::study::framework::{RunRecord, Solved};
 use crate::study::identify::Setup;
+use crate::study::replayed::of_cost;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -277,7 +278,7 @@ pub(super) fn sobol_figure(summary: &Summary) -> Bars {
         let of = |f: fn(&SobolIndex) -> f64| shown.iter().map(move |p| f(&p.sobol[cost]));
         let interval = |f: fn(&SobolIndex) -> [f64; 2]| shown.iter().map(move |p| f(&p.sobol[cost]));
         BarPanel::new(
-            &**cost,
+            of_cost(cost),
             "share of the cost's variance",
             shown.iter().map(|p| &*p.name),
         )
@@ -297,7 +298,7 @@ pub(super) fn one_at_a_time_figure(summary: &Summary) -> Bars {
     let panels = summary.cost_units.iter().map(|(cost, unit)| {
         let label = format!("greatest change of the cost ({unit})");
         let changes = shown.iter().map(|p| p.one_at_a_time[cost].unwrap_or(f64::NAN));
-        BarPanel::new(&**cost, label, shown.iter().map(|p| &*p.name)).bars("", changes)
+        BarPanel::new(of_cost(cost), label, shown.iter().map(|p| &*p.name)).bars("", changes)
     });
     let title = format!("One parameter at a time, each {}", summary.reach);
     Bars::new(title, panels.filter(BarPanel::has_bars))

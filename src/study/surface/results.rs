@@ -6,6 +6,7 @@ use crate::evaluate::failures_in_words;
 use crate::report::{HtmlReport, Levels, Surface, Table, significant, with_unit};
 use crate::study::framework::{RunRecord, Solved};
 use crate::study::identify::Setup;
+use crate::study::replayed::of_cost;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -125,7 +126,7 @@ pub(super) fn report(folder: &Path, solved: &Solved<'_, super::Surface>, summary
         if let Some(Some(least)) = summary.least.get(&objective.name) {
             marks.push(("least".to_owned(), least.at));
         }
-        let told = words_of(&objective.name);
+        let told = of_cost(&objective.name);
         let figure = Surface {
             title: format!("Cost of {told} over {} and {}", x.name, y.name),
             x_label: with_unit(&x.name, &x.unit),
@@ -145,15 +146,6 @@ pub(super) fn report(folder: &Path, solved: &Solved<'_, super::Surface>, summary
     page.write(folder.join("report.html"))
 }
 
-/// What a cost is of.
-fn words_of(objective: &str) -> &str {
-    if objective == "all" {
-        "all channels"
-    } else {
-        objective
-    }
-}
-
 /// The interactive report, up to its surfaces.
 fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
     let [x, y] = &summary.parameters;
@@ -171,7 +163,7 @@ fn begun_page(setup: &Setup, summary: &Summary) -> HtmlReport {
             let [at_x, at_y] = least.at.map(|v| significant(v, 5));
             page.sentence(format!(
                 "The cost of {} is least, {}, where {x} is {at_x} and {y} is {at_y}.",
-                words_of(name),
+                of_cost(name),
                 significant(least.cost, 4)
             ));
         }

@@ -53,6 +53,17 @@ function curvesInEngineers(data) {
   }
 }
 
+function barsInEngineers(data) {
+  const [label, factor] = relabelled(data.value_label);
+  data.value_label = label;
+  if (factor === 1) return;
+  for (const bars of data.series) {
+    bars.values = scaled(bars.values, factor);
+    bars.interval = bars.interval && bars.interval.map((side) => scaled(side, factor));
+    bars.singles = bars.singles.map((values) => scaled(values, factor));
+  }
+}
+
 function surfaceInEngineers(data) {
   ["x", "y"].forEach((axis, place) => {
     const [label, factor] = relabelled(data[`${axis}_label`]);
@@ -108,6 +119,7 @@ function inUnits(charts) {
   for (const chart of charts) {
     if (chart.kind === "lap") lapInEngineers(chart);
     if (chart.kind === "curves") curvesInEngineers(chart);
+    if (chart.kind === "bars") barsInEngineers(chart);
     if (chart.kind === "surface") surfaceInEngineers(chart);
   }
   document.querySelectorAll(".table table").forEach(tableInEngineers);
