@@ -10,7 +10,7 @@ use lapswarm::optimum::{
 };
 use lapswarm::study::framework::{solve_unobserved, write_results};
 use lapswarm::study::raceline::{
-    LineAlgorithm, ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReportedLine, Setup, set_up,
+    LineAlgorithm, Outcome, Raceline, RacelineSettings, ReportedLine, Setup, set_up,
 };
 use std::path::PathBuf;
 
@@ -68,15 +68,20 @@ fn the_surveyed_circuit_gives_the_published_optima() {
     let [length, gamma] = &outcome.objectives[..] else {
         panic!("two objectives")
     };
-    // The exact solvers to the figures' own digits; the swarm from a cold start, without gradients, to five and three times
-    // what is claimed of it and measured here, 0.002 % and 0.1 %: other libraries' roundings lead a search elsewhere.
-    let exact = |o: &ObjectiveOutcome| o.exact.as_ref().unwrap().objective(o.objective);
-    assert!((exact(length) - 5710.944).abs() < 1e-3);
-    assert!((exact(gamma) - 0.12610).abs() < 1e-5);
+    // The optima of the polygon through the cross-sections are those of `convex_optima_of_the_surveyed_silverstone`. The swarm comes
+    // near them from a cold start, without gradients: 0.0005 % and 0.26 % were measured.
     println!("swarm alone: {} m, Gamma {}", length.swarm_cost, gamma.swarm_cost);
-    let [length, gamma] = [length, gamma].map(|o| o.best.objective(o.objective));
-    assert!(length < 5710.944 * 1.0001, "{length}");
-    assert!(gamma < 0.12610 * 1.003, "{gamma}");
+    assert!(length.swarm_cost < 5710.944 * 1.0001, "{}", length.swarm_cost);
+    assert!(gamma.swarm_cost < 0.12610 * 1.004, "{}", gamma.swarm_cost);
+    // What is reported also keeps to the road between the cross-sections, which lie 16 m apart: 0.11 % and 0.28 % more for the
+    // optima, of which the swarm is within 0.002 % and 0.34 % then.
+    for (o, optimum, room, near) in [(length, 5710.944, 1.002, 1.0001), (gamma, 0.12610, 1.005, 1.005)] {
+        let exact = o.exact.as_ref().unwrap();
+        assert!(exact.clearance.is_on_road() && o.best.clearance.is_on_road());
+        let [exact, best] = [exact, &o.best].map(|line| line.objective(o.objective));
+        assert!((1.0..room).contains(&(exact / optimum)), "{exact}");
+        assert!(best < exact * near, "{best} and {exact}");
+    }
 }
 
 /// 1245 kg, 330 kW, CdA 0.9 m^2, 15 to 18 m/s^2 sideways and 14 to 18 lengthways over 25 to 65 m/s, 70 m/s.
@@ -123,8 +128,8 @@ fn a_swarm_alone_finds_the_fastest_line_of_the_surveyed_circuit() {
 }
 
 /// The swarm alone, from a cold start and without gradients, on the fine spline: within 0.3 % of the exact solver's line (the
-/// swarm's spline and the solver's are different ones, and either may be ahead) and, on the surveyed circuit, of the minimum
-/// time; led on by the local search, which says more the closer the cross-sections are together, within 0.1 %. Of tracks,
+/// swarm's spline and the solver's are different ones, and either may be ahead) and, on the surveyed circuit, within 0.5 % of the
+/// minimum time; led on by the local search, which says more the closer the cross-sections are together, within 0.12 %. Of tracks,
 /// envelopes and numbers of sections.
 fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
     for (track, envelope, sections) in cases {
@@ -154,8 +159,11 @@ fn fastest_lines(cases: &[(String, Option<PathBuf>, usize)]) {
         println!("{sections} cross-sections: led on by the local search {led:.3} s, minimum {minimum:.3} s");
         // What minimum-time optimal control comes to elsewhere, at 3 m.
         assert!((minimum / 116.37 - 1.0).abs() < 3e-3, "{minimum}");
-        assert!(sections > 720 || swarm < minimum * 1.003, "{swarm} and {minimum}");
-        assert!(sections < 1440 || led < minimum * 1.001, "{led} and {minimum}");
+        // The minimum keeps to the cross-sections alone, and the lines to the road between them: 0.47 % through 720, 0.35 % through
+        // 1440 were measured.
+        assert!(swarm < minimum * 1.005, "{swarm} and {minimum}");
+        // 0.107 %, of which 0.007 % are room for the corners of the car, which the minimum has not.
+        assert!(sections < 1440 || led < minimum * 1.0012, "{led} and {minimum}");
     }
 }
 
