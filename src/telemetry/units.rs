@@ -30,7 +30,7 @@ impl Quantity {
     /// The quantity's name with the units that are understood, for messages.
     pub fn described(self) -> &'static str {
         match self {
-            Self::Time => "a time (s, ms, min)",
+            Self::Time => "a time (s, ms, us, ns, min)",
             Self::Distance => "a distance (m, km, mm, ft, mi)",
             Self::Speed => "a speed (m/s, km/h, mph, ft/s, kn)",
             Self::Acceleration => "an acceleration (m/s^2, G)",

@@ -400,6 +400,33 @@ fn a_line_that_cannot_be_on_the_road_is_no_result() {
     );
 }
 
+/// The published swarm's line of this seed zigzags between cross-sections 16 m apart and is a metre off the road there.
+#[test]
+fn the_line_of_a_swarm_alone_gives_way_towards_the_reference_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = RacelineSettings {
+        sections: Some(360),
+        algorithm: LineAlgorithm::Thesis,
+        car_width_m: 0.0,
+        car_length_m: 0.0,
+        objectives: vec![LineObjective::Length],
+        population: 100,
+        iterations: 200,
+        inertia: Some(Schedule::Linear { from: 0.1, to: 1.0 }),
+        cognitive: Some(Schedule::Fixed(2.0)),
+        social: Some(Schedule::Fixed(2.0)),
+        seed: 3,
+        backend: BackendChoice::Simd,
+        ..RacelineSettings::default()
+    };
+    let summary = found(&settings, folder.path());
+    let clearance_m = summary.best["length"].clearance_m;
+    assert!(clearance_m >= -0.01, "{clearance_m}");
+    let gave_way =
+        |warning: &String| warning.starts_with("shortest:") && warning.contains("gave way by 16 %");
+    assert!(summary.warnings.iter().any(gave_way), "{:?}", summary.warnings);
+}
+
 /// The minimum-curvature line of the bundled circuit leaves the road by centimetres between its cross-sections, and bending alone
 /// does not bring it back.
 #[test]

@@ -296,7 +296,7 @@ fn handling_figure(rows: &[SmallSteering], car: &str) -> Curves {
         roots = roots.dots(format!("{:.0} m/s", v[i]), points);
     }
     let panels = [gain, factor, damping, roots].into_iter();
-    // No motion of a car may swing.
+    // A car may have no motion that swings.
     Curves::new(format!("Small steering: {car}"), panels.filter(Panel::has_points))
 }
 

@@ -207,7 +207,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
         }
         if let Some(share) = line.gave_way {
             warnings.push(format!(
-                "{}: the swarm's line left the road between the cross-sections; it gave way by {:.0} % of the way to the reference line",
+                "{}: it left the road between the cross-sections, and gave way by {:.0} % of the way to the reference line",
                 line.name,
                 100.0 * share
             ));

@@ -113,9 +113,15 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
             evaluations += found.evaluations;
             record.add(&found.losses, found.backend.as_ref());
             let history = found.history.iter();
+            let mut best = report(&finished.best)?;
+            if !settings.searches_locally() {
+                // A line that has given way is on the road, and says no more that it was not.
+                let own = report(&found.alpha)?;
+                best.gave_way = own.gave_way.filter(|_| own.alpha == finished.best);
+            }
             objectives.push(ObjectiveOutcome {
                 objective,
-                best: report(&finished.best)?,
+                best,
                 swarm_cost: found.cost,
                 exact: exact.as_ref().map(|o| report(&o.alpha)).transpose()?,
                 exact_status: exact.map(|o| o.status.to_string()),
