@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::channel_map::{ChannelMap, Mapped, of_positions};
+use super::channel_map::{ChannelMap, Mapped};
+use super::positions::channel_name;
 use super::recording::{Channel, Clock, Recording};
 use super::role::Role;
 use super::units::Unit;
@@ -180,7 +181,7 @@ impl ChannelList {
             quoted(&self.source)
         );
         // What positions make is made anew.
-        let of_log = |c: &&ListedChannel| c.role.and_then(of_positions) != Some(c.name.as_str());
+        let of_log = |c: &&ListedChannel| c.role.and_then(channel_name) != Some(c.name.as_str());
         let played = |role: Role| self.channels.iter().filter(of_log).find(|c| c.role == Some(role));
         for role in Role::ALL {
             if let Some(channel) = played(role) {

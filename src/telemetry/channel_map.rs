@@ -3,14 +3,13 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::expression::Expression;
-use super::path;
-use super::recording::{Channel, Clock, Recording};
+use super::positions;
+use super::recording::{Channel, Recording};
 use super::role::Role;
 use super::ros;
 use super::text::shown;
@@ -115,7 +114,7 @@ pub struct Mapped<'a> {
 impl Mapped<'_> {
     /// Whether its channel is made of positions.
     pub(super) fn is_of_positions(&self) -> bool {
-        of_positions(self.role) == Some(self.channel.name.as_str())
+        positions::channel_name(self.role) == Some(self.channel.name.as_str())
     }
 }
 
@@ -242,7 +241,8 @@ impl ChannelMap {
                 Some(_) if role == Role::Heading && turns() => {}
                 Some(found) => mapped.push(found),
                 None if role == Role::YawRate
-                    && (self.find(Role::Heading, recording)?.is_some() || self.has_positions(recording)) => {}
+                    && (self.find(Role::Heading, recording)?.is_some()
+                        || positions::are_logged(self, recording)) => {}
                 None if role.required() => return Err(Self::none_found(role, recording)),
                 None => {}
             }
@@ -281,7 +281,7 @@ impl ChannelMap {
             // A column without a number in it, as of lap numbers where no line is set, is none.
             None => guess(role, recording)
                 .filter(|c| role.of_motion() || !c.is_blank())
-                .or_else(|| recording.channel(of_positions(role)?)),
+                .or_else(|| recording.channel(positions::channel_name(role)?)),
         };
         let Some(channel) = found else {
             return match entry {
@@ -344,55 +344,11 @@ impl ChannelMap {
         if !made.is_empty() {
             with.to_mut().channels.extend(made);
         }
-        let made = self.of_positions(&with)?;
+        let made = positions::channels(self, &with)?;
         if !made.is_empty() {
             with.to_mut().channels.extend(made);
         }
         Ok(with)
-    }
-
-    /// What a log of steering lacks and its positions tell.
-    fn of_positions(&self, recording: &Recording) -> Result<Vec<Channel>> {
-        // What is wrong with a channel is told where it is used.
-        let lacks = |role| matches!(self.find(role, recording), Ok(None));
-        let undriven = match self.speed_axle {
-            Axle::Front => [Role::WheelSpeedFl, Role::WheelSpeedFr],
-            Axle::Rear => [Role::WheelSpeedRl, Role::WheelSpeedRr],
-        };
-        let heading = lacks(Role::YawRate) && lacks(Role::Heading);
-        let speed = lacks(Role::Vx) && undriven.into_iter().any(lacks);
-        if !(heading || speed) || lacks(Role::Steer) || !self.has_positions(recording) {
-            return Ok(Vec::new());
-        }
-        let Some(path) = path::Path::of(recording, self)? else {
-            return Ok(Vec::new());
-        };
-        let motion = path.motion();
-        let channel = |role, values| {
-            let role: Role = role;
-            Some(Channel {
-                name: of_positions(role)?.to_owned(),
-                unit: role.si_unit().to_owned(),
-                clock: Clock::Times(Arc::clone(&motion.times_s)),
-                values,
-                unreadable: None,
-                lines: None,
-            })
-        };
-        let made = [
-            heading.then(|| channel(Role::Heading, motion.headings_rad.clone())),
-            speed.then(|| channel(Role::Vx, motion.speeds_mps.clone())),
-        ];
-        Ok(made.into_iter().flatten().flatten().collect())
-    }
-
-    /// Whether a recording has channels of positions.
-    fn has_positions(&self, recording: &Recording) -> bool {
-        let both = |roles: [Role; 2]| {
-            let mut found = roles.into_iter().map(|role| self.find(role, recording));
-            found.all(|found| found.is_ok_and(|found| found.is_some()))
-        };
-        both([Role::Latitude, Role::Longitude]) || both([Role::X, Role::Y])
     }
 
     /// Which of a recording's channels a log is made of.
@@ -412,15 +368,6 @@ impl ChannelMap {
             }
         }
         Ok(chosen)
-    }
-}
-
-/// The name of the channel that positions make for a role.
-pub(super) fn of_positions(role: Role) -> Option<&'static str> {
-    match role {
-        Role::Vx => Some("speed of the positions"),
-        Role::Heading => Some("heading of the positions"),
-        _ => None,
     }
 }
 

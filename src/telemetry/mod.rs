@@ -35,6 +35,7 @@ mod motec_csv;
 mod motec_ld;
 mod outing;
 mod path;
+mod positions;
 mod read;
 mod recording;
 mod resample;

@@ -21,6 +21,8 @@ const SPAN_S: f64 = 0.2;
 /// The same for the heading. Its change is the yaw rate, which asks for more: with fixes at 10 Hz and half the noise that it has
 /// over 0.2 s.
 const HEADING_SPAN_S: f64 = 0.3;
+/// Times at which a standing car has a place made for it, at the most: days at 10 Hz. Longer gaps are left, and refused as such.
+const MOST_STANDING: f64 = 2e6;
 /// A car that is slower than this (m/s) stands, as far as its positions tell.
 pub(super) const STANDING_MPS: f64 = 2.0;
 /// Places on the path that are tried for the line.
@@ -195,11 +197,15 @@ impl Path {
         let pairs = || self.times_s.windows(2).map(|pair| pair[1] - pair[0]);
         let interval_s = median(pairs().collect()).unwrap_or(0.0);
         let mut times_s = Vec::with_capacity(self.times_s.len());
+        let mut left = MOST_STANDING;
         for (i, gap_s) in pairs().enumerate() {
             times_s.push(self.times_s[i]);
-            if self.stations_m[i + 1] - self.stations_m[i] < STANDING_MPS * gap_s {
-                let between = (gap_s / interval_s).round() as usize;
-                times_s.extend((1..between).map(|k| self.times_s[i] + gap_s * k as f64 / between as f64));
+            let between = (gap_s / interval_s).round();
+            let stands = self.stations_m[i + 1] - self.stations_m[i] < STANDING_MPS * gap_s;
+            // No number either, where most fixes have one time.
+            if stands && between <= left {
+                left -= between;
+                times_s.extend((1..between as usize).map(|k| self.times_s[i] + gap_s * k as f64 / between));
             }
         }
         times_s.extend(self.times_s.last());
@@ -440,6 +446,18 @@ pub(crate) mod testing {
         );
         assert!(said("heading: not logged; it is that of the positions"));
         assert!(said("the change of the heading stands in"));
+    }
+
+    #[test]
+    fn gaps_beyond_all_measure_are_left() {
+        for text in [
+            "time (s),x (m),y (m)\n0,0,0\n0.1,1,0\n0.2,2,0\n1e15,3,0\n",
+            "time (s),x (m),y (m)\n0,0,0\n0,0,1\n0,0,2\n0,0,3\n9,0,4\n",
+        ] {
+            let recording = Recording::parse(text.as_bytes(), "gap.csv").expect("a log");
+            let path = Path::of(&recording, &ChannelMap::default()).expect("channels");
+            assert!(path.is_none_or(|path| path.motion().times_s.len() <= 5), "{text}");
+        }
     }
 
     #[test]
