@@ -291,6 +291,7 @@ class Lines(Figures):
     swarm: dict[str, float]
     exact: dict[str, LineFigures | None]
     exact_status: dict[str, str | None]
+    exact_left_percent: dict[str, float | None]
     above_exact_percent: dict[str, float | None]
     reference: LineFigures
     compromise: LineFigures | None

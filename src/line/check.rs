@@ -162,12 +162,14 @@ impl<'a> RoadEdges<'a> {
             let first = i.saturating_sub(reach);
             (first, (i + reach).min(n - 1) - first + 1)
         };
-        let (mut next, mut left) = (first % n, count - less);
+        // Remainders would take more time than all the rest.
+        let wrapped = move |i: usize| if i >= n { i - n } else { i };
+        let (mut next, mut left) = (wrapped(first), count - less);
         let runs = std::iter::from_fn(move || {
             let end = (next + left).min((next / TOGETHER + 1) * TOGETHER).min(n);
             let run = next..end;
             left -= run.len();
-            next = end % n;
+            next = wrapped(end);
             (!run.is_empty()).then_some(run)
         });
         let own = runs.clone().find(|run| run.contains(&i));
@@ -232,7 +234,8 @@ impl<'a> RoadEdges<'a> {
                 continue;
             }
             for i in run {
-                let (from, to) = (edge[i], edge[(i + 1) % edge.len()]);
+                let next = if i + 1 < edge.len() { i + 1 } else { 0 };
+                let (from, to) = (edge[i], edge[next]);
                 let along = to - from;
                 let square = along.length_squared();
                 if square == 0.0 {

@@ -261,23 +261,39 @@ impl Rows {
     }
 }
 
-/// A compressed matrix from entries, those in the same place added up.
-fn columns(height: usize, width: usize, mut entries: Vec<(usize, usize, f64)>) -> CscMatrix<f64> {
-    entries.sort_by_key(|&(row, column, _)| (column, row));
-    entries.dedup_by(|later, kept| {
-        let same = (later.0, later.1) == (kept.0, kept.1);
-        if same {
-            kept.2 += later.2;
-        }
-        same
-    });
-    let mut starts = vec![0; width + 1];
+/// A compressed matrix from entries, those in the same place added up in their order.
+fn columns(height: usize, width: usize, entries: Vec<(usize, usize, f64)>) -> CscMatrix<f64> {
+    let mut ends = vec![0; width];
     for &(_, column, _) in &entries {
-        starts[column + 1] += 1;
+        ends[column] += 1;
     }
-    for column in 0..width {
-        starts[column + 1] += starts[column];
+    let mut first = 0;
+    for end in &mut ends {
+        first += std::mem::replace(end, first);
     }
-    let (rows, values) = entries.iter().map(|&(row, _, value)| (row, value)).unzip();
+    let mut placed = vec![(0, 0.0); entries.len()];
+    for (row, column, value) in entries {
+        placed[ends[column]] = (row, value);
+        ends[column] += 1;
+    }
+    let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::<f64>::new());
+    let mut first = 0;
+    for end in ends {
+        let own = &mut placed[first..end];
+        own.sort_by_key(|(row, _)| *row);
+        for &(row, value) in own.iter() {
+            match (rows.last(), values.last_mut()) {
+                (Some(last), Some(sum)) if *last == row && starts[starts.len() - 1] < rows.len() => {
+                    *sum += value
+                }
+                _ => {
+                    rows.push(row);
+                    values.push(value);
+                }
+            }
+        }
+        starts.push(rows.len());
+        first = end;
+    }
     CscMatrix::new(height, width, starts, rows, values)
 }

@@ -17,6 +17,8 @@ pub struct Optimum {
     pub value: f64,
     /// A bound on the objective that no line passes, if the problem is convex.
     pub lower_bound: Option<f64>,
+    /// What the last cone program of a sequence promised still to gain, in the objective's unit; zero without one.
+    pub promise: f64,
     /// How the solver ended.
     pub status: Status,
     /// The line's measures.
@@ -27,6 +29,15 @@ pub struct Optimum {
     pub iterations: usize,
     /// Elapsed time (s).
     pub seconds: f64,
+}
+
+impl Optimum {
+    /// What may be left to gain, as a share of the value: down to the lower bound where the problem is convex, and otherwise what the last
+    /// cone program promised, which no step need keep.
+    pub fn left(&self) -> f64 {
+        let left = self.lower_bound.map_or(self.promise, |bound| self.value - bound);
+        left.max(0.0) / self.value.abs()
+    }
 }
 
 /// The shortest line: a second-order cone program, one cone for each segment. Its value is the length (m).
@@ -164,6 +175,7 @@ fn solve(
         value: value(&problem, &solution.x),
         x: solution.x,
         lower_bound: Some(solution.lower_bound),
+        promise: 0.0,
         status: solution.status,
         iterations: solution.iterations,
         seconds: start.elapsed().as_secs_f64(),

@@ -27,14 +27,19 @@ pub struct DescentSettings {
     pub roughness_s: f64,
 }
 
+impl DescentSettings {
+    /// Those that lead any line to its optimum.
+    pub const USUAL: Self = Self {
+        programs: 60,
+        least_gain: 1e-6,
+        caution: 1.0,
+        roughness_s: 0.0,
+    };
+}
+
 impl Default for DescentSettings {
     fn default() -> Self {
-        Self {
-            programs: 60,
-            least_gain: 1e-6,
-            caution: 1.0,
-            roughness_s: 0.0,
-        }
+        Self::USUAL
     }
 }
 
@@ -105,7 +110,8 @@ pub fn descend(
     };
     let mut here = judge.place(bounds.inside(&start.x)?);
     let (mut iterations, mut programs, mut caution) = (0, 0, settings.caution);
-    let mut status = Status::Almost(format!("{} programs without an end", settings.programs));
+    // How the sequence ended before its last program, how the latest program failed, and what the latest of the others promised.
+    let (mut ended, mut failure, mut promise) = (None, None, 0.0f64);
     // Whether the next program says that the first-order conditions are met, and how many have been asked to.
     let (mut judging, mut judged) = (false, 0);
     if !here.cost.is_finite() {
@@ -119,7 +125,7 @@ pub fn descend(
     }
     while programs < settings.programs {
         if problem.stopped() {
-            status = Status::Failed("interrupted".to_owned());
+            ended = Some(Status::Failed("interrupted".to_owned()));
             break;
         }
         let tolerance = PROGRAM_TOLERANCE.max(TOLERANCE_OF_GAIN * settings.least_gain);
@@ -128,22 +134,23 @@ pub fn descend(
         let solution = program.solve()?;
         programs += 1;
         iterations += solution.iterations;
-        let promise = -program.value(&solution.x);
         let failed = matches!(solution.status, Status::Failed(_));
-        if failed {
-            status = solution.status.clone();
-            if judging {
-                break;
-            }
-        } else if promise <= settings.least_gain * here.cost.abs() {
+        failure = failed.then(|| solution.status.clone());
+        if !failed {
+            promise = -program.value(&solution.x);
+        }
+        if failed && judging {
+            break;
+        }
+        if !failed && promise <= settings.least_gain * here.cost.abs() {
             if caution <= UNIT_CAUTION {
-                status = solution.status;
+                ended = Some(solution.status);
                 break;
             }
             if judged == JUDGED {
-                status = Status::Almost(format!(
+                ended = Some(Status::Almost(format!(
                     "steps of unit caution still gained after {JUDGED} trials"
-                ));
+                )));
                 break;
             }
             // A great caution makes any promise small: the step of unit caution judges.
@@ -174,13 +181,13 @@ pub fn descend(
             here = there;
         }
         if judging && !kept {
-            status = if gained <= settings.least_gain.max(JUDGED_GAIN) {
+            ended = Some(if gained <= settings.least_gain.max(JUDGED_GAIN) {
                 solution.status
             } else {
                 Status::Almost(format!(
                     "a part of the last step still gained {gained:.1e} of the cost"
                 ))
-            };
+            });
             break;
         }
         judging = false;
@@ -191,16 +198,26 @@ pub fn descend(
         }
         if caution > MOST_CAUTION {
             if !failed {
-                status = Status::Almost("steps too short to tell a gain from rounding".to_owned());
+                ended = Some(Status::Almost(
+                    "steps too short to tell a gain from rounding".to_owned(),
+                ));
             }
             break;
         }
     }
+    let left = promise.max(0.0) / here.cost.abs();
+    let status = ended.or(failure).unwrap_or_else(|| {
+        Status::Almost(format!(
+            "{programs} cone programs at the most, the last of which promised {:.2} %",
+            100.0 * left
+        ))
+    });
     Ok(Optimum {
         measures: problem.measures(&here.x),
         value: weights.sum(&here.measures),
         x: here.x,
         lower_bound: None,
+        promise,
         status,
         programs,
         iterations,

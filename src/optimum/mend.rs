@@ -18,7 +18,7 @@ const REACH_CROSS_SECTIONS: f64 = 2.0;
 const ZONE: f64 = 4.0;
 
 /// `alpha` of a line near the given one on which no clearance is negative; nothing where none is found. `measure` gives a line's
-/// fine spline, and the clearances on the right and on the left (m) at each of its points.
+/// fine spline, and the clearances on the right and on the left (m) at each of its points; `found` is what it gave for this one.
 ///
 /// The move is the one of least `sum of (l^2 d'')^2 + d^2` with `d` the distance along the cross-sections: it changes the
 /// curvature least, and dies away at the distance `l`.
@@ -28,6 +28,7 @@ const ZONE: f64 = 4.0;
 pub fn mended(
     cross_sections: &CrossSections,
     alpha: &[f64],
+    found: (FineLine, Vec<[f64; 2]>),
     measure: impl Fn(&[f64]) -> Result<(FineLine, Vec<[f64; 2]>)>,
 ) -> Result<Option<Vec<f64>>> {
     let n = cross_sections.len();
@@ -47,12 +48,13 @@ pub fn mended(
     };
     let mut moved_m = vec![0.0; n];
     let mut variable = vec![None; n];
+    let mut found = Some(found);
     for _ in 0..ROUNDS {
         let moved = alpha.iter().zip(&moved_m).zip(&widths);
         let line: Vec<f64> = moved
             .map(|((alpha, moved), width)| (alpha + moved / width).clamp(0.0, 1.0))
             .collect();
-        let (fine, clearances) = measure(&line)?;
+        let (fine, clearances) = found.take().map_or_else(|| measure(&line), Ok)?;
         if Clearance::least(&fine, &clearances).margin_m >= 0.0 {
             return Ok(Some(line));
         }

@@ -1,8 +1,9 @@
 //! The reference optimum of each objective on one track, and the local search by exact gradients.
 
 use super::{
-    Bounds, DescentSettings, LineMap, Optimum, PointMassEnvelope, ReferenceProblem, Start, Status, Weights,
-    fastest, least_gamma, least_squared_length, minimum_curvature_of, polish_lines, shortest,
+    Bounds, DescentSettings, LineMap, Optimum, PointMassEnvelope, ReferenceProblem, SegmentBend, Start,
+    Status, Weights, fastest, least_gamma, least_squared_length, minimum_curvature_of, polish_lines,
+    shortest,
 };
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
@@ -56,6 +57,8 @@ pub struct OptimumLine {
     pub alpha: Vec<f64>,
     /// How the solver ended.
     pub status: Status,
+    /// [What may be left to gain](Optimum::left), as a share of the objective.
+    pub left: f64,
     /// Time taken (s).
     pub seconds: f64,
 }
@@ -230,9 +233,17 @@ impl ReferenceSolvers {
         &self.stop
     }
 
+    /// The problem of lines of a map. Only those that have a cross-section for each variable could zigzag from one to the next, which
+    /// the mean of both ends' bends would not see.
     fn problem<'a>(&'a self, map: &'a LineMap) -> ReferenceProblem<'a> {
+        let bend = if map.variables() < map.points() {
+            SegmentBend::Mean
+        } else {
+            SegmentBend::Tighter
+        };
         ReferenceProblem {
             envelope: self.envelope.as_ref().map(|l| l as _),
+            bend,
             start_mps: self.entry_mps,
             spacing_m: Some(&self.spacing_m),
             stop: Some(&self.stop),
@@ -295,6 +306,7 @@ impl ReferenceSolvers {
         };
         let solved = solve(self)?;
         Ok(Some(OptimumLine {
+            left: solved.left(),
             alpha: within_road(solved.x),
             status: solved.status,
             seconds: solved.seconds,
@@ -340,9 +352,9 @@ impl ReferenceSolvers {
 
     /// The fastest line near one, stage by stage; only what the last of them finds has to be on the road.
     fn about_itself(&self, alpha: &[f64], stages: &[About]) -> Result<Option<Optimum>> {
-        let Some(envelope) = &self.envelope else {
+        if self.envelope.is_none() {
             return Ok(None);
-        };
+        }
         let mut found: Option<Optimum> = None;
         for (turn, how) in stages.iter().enumerate() {
             if self.stop.load(Ordering::Relaxed) {
@@ -350,7 +362,7 @@ impl ReferenceSolvers {
             }
             let kept = turn + 1 == stages.len();
             let alpha = found.as_ref().map_or(alpha, |f| &f.x);
-            if let Some(closer) = self.taken_about(envelope, alpha, how, kept)? {
+            if let Some(closer) = self.taken_about(alpha, how, kept)? {
                 let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
                 found = Some(Optimum {
                     seconds: before_s + closer.seconds,
@@ -363,13 +375,7 @@ impl ReferenceSolvers {
 
     /// The fastest line about one, if it is faster. If it is to be kept on the road, a line on the road is
     /// better than any other.
-    fn taken_about(
-        &self,
-        envelope: &PointMassEnvelope,
-        alpha: &[f64],
-        how: &About,
-        kept: bool,
-    ) -> Result<Option<Optimum>> {
+    fn taken_about(&self, alpha: &[f64], how: &About, kept: bool) -> Result<Option<Optimum>> {
         let own = self.cross_sections.points(alpha);
         // A closed spline through as many points of the line as there are controls has no ripples that these could not take off. A
         // line that touches jagged edges has, and a lap on the fine spline suffers from every one.
@@ -383,10 +389,8 @@ impl ReferenceSolvers {
         let controls = (about.len() / how.cross_sections_per_control).max(4);
         let (map, mut bounds) = LineMap::spline_about(&about, &about.reference, controls);
         let problem = ReferenceProblem {
-            envelope: Some(envelope),
-            start_mps: self.entry_mps,
-            stop: Some(&self.stop),
-            ..ReferenceProblem::of(&map)
+            spacing_m: None,
+            ..self.problem(&map)
         };
         let start = vec![0.0; map.variables()];
         // Where the cross-sections are so far apart that no such spline is on the road, the line stays as it is.
@@ -481,20 +485,16 @@ impl ReferenceSolvers {
             .collect()
     }
 
-    /// Leads lines to the nearest optimum, each by its own weights of the objectives, in `programs` cone programs at most.
+    /// Leads lines to the nearest optimum, each by its own weights of the objectives.
     ///
     /// # Errors
     /// [`crate::Error::Study`] if a solver refuses.
-    pub fn polish(&self, lines: Vec<WeightedLine>, programs: usize) -> Result<Vec<Vec<f64>>> {
+    pub fn polish(&self, lines: Vec<WeightedLine>, settings: &DescentSettings) -> Result<Vec<Vec<f64>>> {
         let timed = lines
             .iter()
             .flat_map(|(_, terms)| terms)
             .any(|(o, w)| *o == LineObjective::LapTime && *w > 0.0);
         let (map, bounds) = if timed { &self.smooth } else { &self.every };
-        let settings = DescentSettings {
-            programs,
-            ..DescentSettings::default()
-        };
         let starts: Vec<Start> = lines
             .into_iter()
             .map(|(alpha, terms)| Start {
@@ -502,7 +502,7 @@ impl ReferenceSolvers {
                 weights: self.weights(terms),
             })
             .collect();
-        let polished = polish_lines(&self.problem(map), bounds, &starts, &settings)?;
+        let polished = polish_lines(&self.problem(map), bounds, &starts, settings)?;
         let alpha = |p: Optimum| within_road(self.shares(map, &p.x));
         Ok(polished.into_iter().map(alpha).collect())
     }

@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Corner;
+use super::friction_map::FrictionMap;
 use super::reference::Smoothing;
 use super::relief::FRICTIONS;
 use super::survey::{Survey, SurveyOptions};
@@ -30,6 +31,7 @@ struct SurveyFile {
     smoothing_height_m: Option<Spanned<f64>>,
     smoothing_bank_deg: Option<Spanned<f64>>,
     friction: Option<Spanned<f64>>,
+    friction_map: Option<String>,
     #[serde(default)]
     sections: Vec<SectionEntry>,
     #[serde(default)]
@@ -81,11 +83,17 @@ pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
     if let Some(name) = &file.name {
         survey.name = check.name(name, "name")?;
     }
-    if let Some(friction) = within(&file.friction, "friction", FRICTIONS.0, FRICTIONS.1)?
-        && survey.friction.is_empty()
-        && !file.flat
-    {
-        survey.friction = vec![[friction; 2]; survey.centre_m.len()];
+    let friction = within(&file.friction, "friction", FRICTIONS.0, FRICTIONS.1)?;
+    match (&file.friction_map, friction) {
+        _ if file.flat => {}
+        (Some(map), elsewhere) => {
+            let map = FrictionMap::load(&folder_of(path).join(map))?;
+            survey.friction = map.beside(&survey, elsewhere.unwrap_or(1.0))?;
+        }
+        (None, Some(friction)) if survey.friction.is_empty() => {
+            survey.friction = vec![[friction; 2]; survey.centre_m.len()];
+        }
+        _ => {}
     }
     if !(file.sections.is_empty() && file.corners.is_empty() && file.drs_zones.is_empty()) {
         let length_m = survey.smoothed(&smoothing)?.length_m();

@@ -15,6 +15,7 @@ mod cross_sections;
 mod crossing;
 mod cutting;
 mod export;
+mod friction_map;
 mod from_curvature;
 mod load;
 mod load_survey;

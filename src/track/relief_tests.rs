@@ -267,3 +267,66 @@ fn heights_of_gpx_and_kml_are_read_where_all_points_have_one() {
     let kml = Survey::parse(kml.as_bytes(), Path::new("a.kml"), &wide).unwrap();
     assert_eq!(kml.z_m[1], 301.0);
 }
+
+/// A map of points on a grid of half a metre, slippery on the left half of the road over a quarter of the circle: the friction of the
+/// line through it from edge to edge, that of the whole road where no point is near, and what is refused.
+#[test]
+fn friction_is_read_from_a_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    file("circle.csv", &circle("", |_| String::new(), None));
+    let (mut points, mut told, mut values) = ("# x_m;y_m\n".to_owned(), String::new(), Vec::new());
+    for i in -220..=220 {
+        for j in -220..=220 {
+            let (x, y) = (0.5 * f64::from(i), 0.5 * f64::from(j));
+            let (radius, angle) = (x.hypot(y), y.atan2(x));
+            // The left side of a left-hander is its inside. The map ends at an angle of two.
+            if (94.0..=106.0).contains(&radius) && (0.0..2.0).contains(&angle) {
+                let wet = radius < 100.0 && (0.3..1.2).contains(&angle);
+                let friction = if wet { 0.5 } else { 1.0 };
+                let _ = writeln!(points, "{x};{y}");
+                let _ = writeln!(told, "{x},{y},{friction}");
+                values.push(format!("\"{}\": [{friction}]", values.len()));
+            }
+        }
+    }
+    file("circle_tpamap.csv", &points);
+    file("circle_tpadata.json", &format!("{{{}}}", values.join(",")));
+    file("told.csv", &told);
+    let read = |text: &str| {
+        let path = folder.path().join("road.toml");
+        std::fs::write(&path, text).unwrap();
+        super::load_survey::read(&path, text).map(|(survey, _)| survey.friction)
+    };
+    let map = read("survey = \"circle.csv\"\nfriction_map = \"circle_tpamap.csv\"\nfriction = 0.8").unwrap();
+    assert_eq!(
+        map,
+        read("survey = \"circle.csv\"\nfriction_map = \"told.csv\"\nfriction = 0.8").unwrap()
+    );
+    let at = |angle: f64| map[(angle / TAU * 120.0).round() as usize];
+    assert_eq!((at(0.8), at(1.6), at(4.0)), ([0.5, 1.0], [1.0; 2], [0.8; 2]));
+
+    file("far.csv", "1000,1000,0.5\n");
+    file("half.csv", "100,0,0.5\n100,1\n");
+    file("words.csv", "x_m,y_m,friction\n100,zero,0.5\n");
+    file("ice.csv", "100,0,0.5\n100,1,0.01\n");
+    file("bare.csv", "100,0\n");
+    file("slick_tpamap.csv", "100,0\n");
+    file("slick_tpadata.json", "{\"0\": [2]}");
+    file("lost_tpamap.csv", "100,0\n100,1\n");
+    file("lost_tpadata.json", "{\"0\": [0.5]}");
+    for (map, named) in [
+        ("far.csv", "no point within 5 m"),
+        ("half.csv", "line 2"),
+        ("words.csv", "line 2"),
+        ("ice.csv", "line 2"),
+        ("bare.csv", "_tpadata.json"),
+        ("lost_tpamap.csv", "no friction of point 1"),
+        ("slick_tpamap.csv", "2 at point 0"),
+        ("none.csv", "none.csv"),
+    ] {
+        let text = format!("survey = \"circle.csv\"\nfriction_map = \"{map}\"");
+        let refused = read(&text).unwrap_err().to_string();
+        assert!(refused.contains(named), "{map}: {refused}");
+    }
+}

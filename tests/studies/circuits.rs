@@ -6,6 +6,7 @@ use lapswarm::evaluate::line::LineObjective;
 use lapswarm::line::ON_ROAD_M;
 use lapswarm::study::framework::solve_unobserved;
 use lapswarm::study::raceline::{Raceline, RacelineSettings, set_up};
+use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -98,11 +99,32 @@ fn short_laps_do_not_depend_on_how_closely_they_are_cut() {
 #[test]
 fn set_ups_have_lines_of_their_own() {
     let folder = tempfile::tempdir().expect("a folder");
+    lighter_cars_are_faster(settings(&Circuit::random(3), folder.path()));
+}
+
+/// So they are on the same circuit with hills of 18 m and grip that varies by a fifth.
+#[test]
+fn set_ups_in_hills_have_lines_of_their_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = settings(&Circuit::random(3), folder.path());
+    let level = std::fs::read_to_string(&settings.track).expect("the circuit");
+    let rows: Vec<&str> = level.lines().filter(|row| !row.starts_with('#')).collect();
+    let mut hills = "# x_m,y_m,w_tr_right_m,w_tr_left_m,z_m,friction\n".to_owned();
+    for (i, row) in rows.iter().enumerate() {
+        let angle = std::f64::consts::TAU * i as f64 / rows.len() as f64;
+        let (z_m, friction) = (9.0 * angle.sin(), 0.9 + 0.1 * (2.0 * angle).cos());
+        let _ = writeln!(hills, "{row},{z_m},{friction}");
+    }
+    std::fs::write(&settings.track, hills).expect("a file");
+    lighter_cars_are_faster(settings);
+}
+
+fn lighter_cars_are_faster(settings: RacelineSettings) {
     let settings = RacelineSettings {
         objectives: vec![LineObjective::LapTime],
         setups: Some(5),
         parameters: vec!["mass_kg".to_owned()],
-        ..settings(&Circuit::random(3), folder.path())
+        ..settings
     };
     let setup = set_up(&settings).expect("a circuit");
     let found = solve_unobserved::<Raceline>(&settings, &setup).expect("lines");

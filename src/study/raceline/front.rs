@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::evaluate::line::{LineProblem, open_line_evaluator};
 use crate::evaluate::{BackendInfo, DeviceFaults, Evaluator, FailureCounts, Losses};
 use crate::line::Parametrisation;
-use crate::optimum::{ReferenceSolvers, WeightedLine, interruptible};
+use crate::optimum::{DescentSettings, ReferenceSolvers, WeightedLine, interruptible};
 use crate::random::Random;
 use crate::swarm::metrics::{Scale, hypervolume};
 use crate::swarm::{Archive, Optimiser, Progress, Reached, SwarmAtWork, SwarmState, Truncation, lattice};
@@ -47,10 +47,15 @@ const BLEND_SPREAD: f64 = 0.01;
 const BLENDS: u32 = 10;
 /// Steps between the objectives of the local search: `LATTICE` and the number of objectives give its lines.
 const LATTICE: u32 = 6;
-/// Waves in which they are led downhill, and cone programs for each line. Six programs in one wave over five steps take 7 to 23 % more
-/// time on three circuits, for a hypervolume that is 0.2 to 1.3 % less.
+/// Waves in which they are led downhill. Six programs for each line in one wave over five steps take 7 to 23 % more time on three
+/// circuits, for a hypervolume that is 0.2 to 1.3 % less.
 const WAVES: usize = 2;
-const PROGRAMS: usize = 3;
+/// How each is. Programs that promise less gain a fraction of it.
+const POLISH: DescentSettings = DescentSettings {
+    programs: 3,
+    least_gain: 4e-5,
+    ..DescentSettings::USUAL
+};
 
 /// Looks for the front. `known` are lines to start from and to keep (`alpha` at every cross-section). `begun` is the swarm of the same
 /// search that was interrupted, if one was, and what is known to go wrong with devices; `observe` is told of
@@ -127,7 +132,7 @@ pub(super) fn search_front(
         for wave in 0..WAVES {
             let starts = starts_along(&archive, weights.iter().skip(wave).step_by(WAVES), settings);
             let polished = std::thread::scope(|scope| {
-                let led = scope.spawn(|| solvers.polish(starts, PROGRAMS));
+                let led = scope.spawn(|| solvers.polish(starts, &POLISH));
                 interruptible(led, solvers.flag(), || observe(&latest, &mut || state.clone()))
             })?;
             let polished = on_road(setup, settings, &polished)?;

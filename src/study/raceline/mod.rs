@@ -50,6 +50,8 @@ pub struct ObjectiveOutcome {
     pub exact: Option<ReportedLine>,
     /// How its solver ended, in plain words.
     pub exact_status: Option<String>,
+    /// What it says may be left to gain, as a share of the objective.
+    pub exact_left: Option<f64>,
     /// Best cost on the way of its swarm.
     pub history: Vec<Reached>,
 }

@@ -85,6 +85,10 @@ pub struct Summary {
     pub exact: BTreeMap<String, Option<LineFigures>>,
     /// How their solver ended, in plain words; `null` where there is no solver.
     pub exact_status: BTreeMap<String, Option<String>>,
+    /// What the solver says may be left to gain of each objective (%): down to its lower bound for `length`, `length_squared` and `gamma`,
+    /// and for the others what its last cone program promised, of which steps keep a part.
+    #[serde(default)]
+    pub exact_left_percent: BTreeMap<String, Option<f64>>,
     /// How much more the best line costs than the reference optimum, of each objective (%); lap times on the fine spline.
     pub above_exact_percent: BTreeMap<String, Option<f64>>,
     /// The reference line.
@@ -130,6 +134,9 @@ pub(super) fn summarise(solved: &Solved<'_, Raceline>) -> Summary {
             .map(|(name, o)| (name, o.exact.as_ref().map(LineFigures::of)))
             .collect(),
         exact_status: each().map(|(name, o)| (name, o.exact_status.clone())).collect(),
+        exact_left_percent: each()
+            .map(|(name, o)| (name, o.exact_left.map(|left| 100.0 * left)))
+            .collect(),
         above_exact_percent: each()
             .map(|(name, o)| {
                 let exact = o.exact.as_ref().map(|line| line.worth(o.objective));

@@ -84,22 +84,11 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let car = Car::load(&settings.car)?;
     let (envelope, car_name) = match &settings.envelope {
         Some(path) => (Envelope::load(path)?, path.display().to_string()),
-        None => {
-            // On a level road the weight is the only load.
-            let limits = match &road.relief {
-                Some(relief) if !relief.is_level() => car_envelope_under_loads(&car, &SpeedRange::USUAL)?,
-                _ => car_envelope(&car, &SpeedRange::USUAL)?,
-            };
-            (limits.envelope, car.name.clone())
-        }
+        None => (envelope_on(&road, &car)?, car.name.clone()),
     };
     let gearbox = car.powertrain.clone().filter(|_| settings.envelope.is_none());
     let gearbox = gearbox.map(|powertrain| (powertrain, car.chassis.radius_rear));
-    let car = PointMass {
-        relief: road.relief.is_some(),
-        ..point_mass(&car, envelope, settings)?
-    };
-    car.check()?;
+    let car = point_mass(&road, &car, envelope, settings)?;
     Ok(Setup {
         track_name: track.name(),
         road,
@@ -111,16 +100,34 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     })
 }
 
-/// The point mass of a car within an envelope.
+/// A car's own envelope on a road. On a level road its weight is the only load.
+///
+/// # Errors
+/// Those of [`car_envelope`].
+pub(super) fn envelope_on(road: &CrossSections, car: &Car) -> Result<Envelope> {
+    let limits = match &road.relief {
+        Some(relief) if !relief.is_level() => car_envelope_under_loads(car, &SpeedRange::USUAL)?,
+        _ => car_envelope(car, &SpeedRange::USUAL)?,
+    };
+    Ok(limits.envelope)
+}
+
+/// The point mass of a car within an envelope on a road.
 ///
 /// # Errors
 /// Those of [`PointMass::check`].
-pub(super) fn point_mass(car: &Car, envelope: Envelope, settings: &RacelineSettings) -> Result<PointMass> {
+pub(super) fn point_mass(
+    road: &CrossSections,
+    car: &Car,
+    envelope: Envelope,
+    settings: &RacelineSettings,
+) -> Result<PointMass> {
     let wheelbase = car.chassis.cg_to_front + car.chassis.cg_to_rear;
     let car = PointMass {
         ellipse_exponent: settings.ellipse_exponent,
         max_steer_rad: Some(car.max_steer_rad),
         rotating_mass_factor: car.rotating_mass_factor(),
+        relief: road.relief.is_some(),
         ..PointMass::new(envelope, wheelbase)
     };
     car.check()?;
@@ -331,8 +338,12 @@ impl Setup {
         if least.margin_m >= 0.0 {
             return Ok(Some(alpha.to_vec()));
         }
-        if let Some(line) = mended(&self.cross_sections, alpha, |line| self.measured(line, settings))? {
-            return Ok(Some(line));
+        let found = (fine, clearances);
+        let mended = mended(&self.cross_sections, alpha, found, |line| {
+            self.measured(line, settings)
+        })?;
+        if mended.is_some() {
+            return Ok(mended);
         }
         if least.is_on_road() {
             return Ok(Some(alpha.to_vec()));

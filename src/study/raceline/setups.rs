@@ -3,7 +3,7 @@
 //! Set-ups are solved in batches that double. Each starts from the line of the nearest set-up that is done, so that few programs are
 //! left to solve. A sample of them is solved once more from the minimum-curvature line, as if nothing were known.
 
-use super::setup::{Setup, point_mass};
+use super::setup::{Setup, envelope_on, point_mass};
 use super::state::Running;
 use super::{RacelineSettings, ReportedLine};
 use crate::error::{Error, Result};
@@ -11,7 +11,6 @@ use crate::evaluate::line::LineObjective;
 use crate::optimum::{ReferenceSolvers, interruptible};
 use crate::study::framework::Progress;
 use crate::study::framework::setups::{FreeParameter, car_of, free_parameters, setups_of};
-use crate::vehicle::limits::{SpeedRange, car_envelope};
 use crate::vehicle::{Car, CarParameter};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -80,15 +79,6 @@ pub(super) fn solve_setups(
     stop: &Arc<AtomicBool>,
     work: &mut Running<'_>,
 ) -> Result<SetupsOutcome> {
-    if setup.road.relief.is_some() {
-        let found = "set-ups on a road with height, banking or friction";
-        return Err(Error::input(
-            "the study",
-            "setups",
-            found,
-            "a level and dry road (flat = true)",
-        ));
-    }
     let car = Car::load(&settings.car)?;
     let free = free_parameters(&car, &settings.parameters, settings.share)?;
     let setups = setups_of(&car, &free, settings.setups.unwrap_or(0), settings.seed);
@@ -167,9 +157,10 @@ impl Batch<'_> {
             self.free.iter().map(|(parameter, ..)| parameter),
             values,
         );
-        match car_envelope(&car, &SpeedRange::USUAL) {
-            Ok(limits) => {
-                let car = point_mass(&car, limits.envelope, self.settings)?;
+        let road = &self.setup.road;
+        match envelope_on(road, &car) {
+            Ok(envelope) => {
+                let car = point_mass(road, &car, envelope, self.settings)?;
                 self.solvers.of_car(&car).map(Some)
             }
             // A car that no speed suits is a set-up without a lap.

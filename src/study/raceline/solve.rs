@@ -8,7 +8,7 @@ use super::{ObjectiveOutcome, Outcome, Raceline, RacelineSettings, ReportedLine,
 use crate::error::{Error, Result};
 use crate::evaluate::line::{LineObjective, open_line_evaluator};
 use crate::line::Parametrisation;
-use crate::optimum::{OptimumLine, ReferenceSolvers, interruptible};
+use crate::optimum::{DescentSettings, OptimumLine, ReferenceSolvers, interruptible};
 use crate::study::framework::state_file::Origin;
 use crate::study::framework::{Progress, RunRecord, Watch, Work};
 use crate::swarm::Reached;
@@ -124,6 +124,7 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
                 best,
                 swarm_cost: found.cost,
                 exact: exact.as_ref().map(|o| report(&o.alpha)).transpose()?,
+                exact_left: exact.as_ref().map(|o| o.left),
                 exact_status: exact.map(|o| o.status.to_string()),
                 history: history
                     .map(|row| Reached::best(row.evaluations, row.elapsed_s, row.best))
@@ -224,5 +225,8 @@ fn led_downhill(
     {
         return Ok(vec![led.x]);
     }
-    solvers.polish(vec![(found.to_vec(), vec![(objective, 1.0)])], 60)
+    solvers.polish(
+        vec![(found.to_vec(), vec![(objective, 1.0)])],
+        &DescentSettings::USUAL,
+    )
 }

@@ -31,6 +31,15 @@ function seriesColour(n) {
   const i = n % (PALETTE.length + 1);
   return i < PALETTE.length ? PALETTE[i] : theme().ink;
 }
+// Lines beyond the last colour begin anew, dashed.
+const isDashed = (n) => n > PALETTE.length;
+function seriesStroke(n) {
+  return { color: seriesColour(n), type: isDashed(n) ? "dashed" : "solid" };
+}
+function seriesSwatch(n) {
+  const colour = seriesColour(n);
+  return isDashed(n) ? `repeating-linear-gradient(90deg, ${colour} 0 5px, transparent 5px 8px)` : colour;
+}
 
 const VIRIDIS = [
   "#440154",

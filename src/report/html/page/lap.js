@@ -34,7 +34,7 @@ draw.lap = (place, lap) => {
   const cells = lines.map((line, i) => {
     const box = element("input", { type: "checkbox", checked: "" });
     const swatch = element("span", { class: "swatch" });
-    swatch.style.background = seriesColour(i);
+    swatch.style.background = seriesSwatch(i);
     const row = element(
       "tr",
       {},
@@ -78,8 +78,8 @@ draw.lap = (place, lap) => {
           sampling: "lttb",
           emphasis: { disabled: true },
           lineStyle: line.wide
-            ? { color: seriesColour(i), width: 4, opacity: 0.45 }
-            : { color: seriesColour(i), width: 1.4 },
+            ? { ...seriesStroke(i), width: 4, opacity: 0.45 }
+            : { ...seriesStroke(i), width: 1.4 },
           itemStyle: { color: seriesColour(i) },
           z: 10 + i,
         };

@@ -193,7 +193,7 @@ function trackMap(place, lap, shown, onHover) {
       mark.hidden =
         cursor === null || !shown(line.index) || !(px >= 0 && py >= 0 && px <= width && py <= height);
       mark.style.transform = `translate(${px}px, ${py}px)`;
-      mark.style.background = seriesColour(line.index);
+      mark.style.background = seriesSwatch(line.index);
     });
   };
 
