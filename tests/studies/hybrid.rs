@@ -306,11 +306,11 @@ fn the_swarm_comes_within_hundredths_of_a_second_of_the_exact_deployment() {
     let setup = &set_up(&settings).unwrap();
     let engine = drive(setup, "engine", Mode::Additional, NO_MOTOR).unwrap();
     let mut before = engine.lap.time;
-    // Of three seeds the middle one. Measured are 0.0002 s and less: no less than what the exact deployment is held to. With 1 MJ one
-    // of five seeds ends 0.013 s above it.
+    // Of five seeds the middle one. Measured are 0.0002 s and less: no less than what the exact deployment is held to. With 1 MJ two
+    // of nine seeds end 0.013 s above it.
     for mj in [1.0, 2.1, 5.3] {
         let exact = setup.exact(1e6 * mj, None).unwrap();
-        let mut swarms = [1, 2, 3].map(|seed| {
+        let mut swarms = [1, 2, 3, 4, 5].map(|seed| {
             search_strategy(
                 setup,
                 &HybridStudySettings {
@@ -324,9 +324,9 @@ fn the_swarm_comes_within_hundredths_of_a_second_of_the_exact_deployment() {
             .unwrap()
         });
         swarms.sort_by(|a, b| a.lap.lap.time.total_cmp(&b.lap.lap.time));
-        let worst = swarms[2].lap.lap.time;
+        let worst = swarms[4].lap.lap.time;
         assert!(worst < exact.lap.time + 0.02, "{mj} MJ: {worst} s");
-        let [_, swarm, _] = swarms;
+        let [_, _, swarm, ..] = swarms;
         let time = swarm.lap.lap.time;
         println!(
             "{mj} MJ: swarm {time:.4} s, exact {:.4} s, bound {:?} s",
