@@ -208,7 +208,7 @@ pub fn descend(
     let left = promise.max(0.0) / here.cost.abs();
     let status = ended.or(failure).unwrap_or_else(|| {
         Status::Almost(format!(
-            "{programs} cone programs at the most, the last of which promised {:.2} %",
+            "{programs} cone programs at the most, the last of which promised a gain of {:.2} %",
             100.0 * left
         ))
     });

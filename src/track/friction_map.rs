@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// How a map's file and that of its values end, where it has the points alone.
 const POINTS: &str = "_tpamap.csv";
 const VALUES: &str = "_tpadata.json";
-/// Distance (m) from a point of the map beyond which a place is dry.
+/// Distance (m) beyond which a point of the map says nothing of a place.
 const REACH_M: f64 = 5.0;
 /// Places from edge to edge at which a map is read.
 const ACROSS: usize = 21;
@@ -85,8 +85,9 @@ impl FrictionMap {
         (distance <= REACH_M * REACH_M).then(|| self.friction[i])
     }
 
-    /// Friction at the left and the right edge beside each point of a survey: the straight line through what the map has from edge to
-    /// edge that is nearest by least squares, no more and no less slippery than that anywhere. Where the map has no point within 5 m, the road is as slippery as `elsewhere`.
+    /// Friction at the left and the right edge beside each point of a survey: the straight line that is nearest, by least squares, to
+    /// what the map has from edge to edge, held within the range of that. Where the map has no point within 5 m, the friction is
+    /// `elsewhere`.
     ///
     /// # Errors
     /// [`Error::Input`] for a map that has no point on the road.

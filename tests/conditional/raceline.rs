@@ -327,6 +327,10 @@ fn a_study_of_the_bundled_circuit_holds_together() {
     let gap = json["above_exact_percent"]["lap_time"].as_f64().unwrap();
     assert!((gap - 100.0 * (fine("best") / fine("exact") - 1.0)).abs() < 1e-9);
     assert_eq!(json["exact_status"]["length"], "Solved");
+    // The lower bound of a convex program is as near as its tolerance. Steps of the fastest line promise what they do.
+    let left = |objective: &str| json["exact_left_percent"][objective].as_f64().expect("a share");
+    assert!((0.0..1e-4).contains(&left("length")), "{}", left("length"));
+    assert!(left("lap_time") >= 0.0);
     let again = RacelineSettings::read(&folder.path().join("study.toml")).unwrap();
     assert_eq!(again, settings);
 }

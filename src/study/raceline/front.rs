@@ -50,7 +50,7 @@ const LATTICE: u32 = 6;
 /// Waves in which they are led downhill. Six programs for each line in one wave over five steps take 7 to 23 % more time on three
 /// circuits, for a hypervolume that is 0.2 to 1.3 % less.
 const WAVES: usize = 2;
-/// How each is. Programs that promise less gain a fraction of it.
+/// How each line is led. Programs that promise less than this share of its cost gain a fraction of that.
 const POLISH: DescentSettings = DescentSettings {
     programs: 3,
     least_gain: 4e-5,
