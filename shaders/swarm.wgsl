@@ -13,13 +13,13 @@ struct Generation {
     signed: u32,
     per_dimension: u32,
     tournament: u32,
-    mutation: u32,
     inertia: f32,
     cognitive: f32,
     social: f32,
     speed_limit: f32,
     rebound: f32,
-    difference_share: f32,
+    crossings: f32,
+    no_pulls: f32,
     mutation_share: f32,
     mutation_power: f32,
     mutation_root: f32,
@@ -33,6 +33,7 @@ const FAILED: u32 = 0x7f7fff00u;
 const REASONS: u32 = 15u;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
+const CROSSING_POWER: f32 = 21.0;
 
 // What random draws are for, the counter's last word.
 const START: u32 = 1u;
@@ -162,9 +163,12 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     let choice = words(RECOMBINE, who, 0u);
     var leader = below(choice.y, generation.members);
     if generation.tournament == 1u { leader = min(leader, below(choice.z, generation.members)); }
-    let differs = unit(choice.x) < generation.difference_share;
-    let disturbed = generation.mutation == 1u && unit(choice.w) < generation.mutation_share;
-    move_one(who, leader, differs, disturbed);
+    let coin = unit(choice.x);
+    if coin < generation.crossings {
+        cross_one(who, leader);
+        return;
+    }
+    move_one(who, leader, coin < generation.no_pulls, unit(choice.w) < generation.mutation_share);
 }
 
 // Shares of the velocity and of the ways to the own best and to the leader.
@@ -234,18 +238,51 @@ fn move_one(who: u32, leader: u32, differs: bool, disturbed: bool) {
         if disturbed {
             if k % 2u == 0u { mutation = words(MUTATION, who, k / 2u); }
             let pair = 2u * (k % 2u);
-            if unit(mutation[pair]) * f32(d) < 1.0 { x = polynomial(x, unit(mutation[pair + 1u])); }
+            if unit(mutation[pair]) * f32(d) < 1.0 { x = polynomial(x, unit(mutation[pair + 1u]), generation.mutation_power, generation.mutation_root); }
         }
         velocity[i] = v;
         position[i] = x;
     }
 }
 
-fn polynomial(x: f32, uniform_draw: f32) -> f32 {
+// To a place between or about two archive members, each coordinate by itself, disturbed by polynomial mutation.
+fn cross_one(who: u32, leader: u32) {
+    let d = generation.dimensions;
+    let other = below(words(RECOMBINE, who, 1u).x, generation.members);
+    for (var k = 0u; k < d; k++) {
+        let draws = words(RECOMBINE, who, 2u + k);
+        var x = cross_coordinates(archive[leader * d + k], archive[other * d + k], draws.x, unit(draws.y));
+        if unit(draws.z) * f32(d) < 1.0 {
+            x = polynomial(x, unit(draws.w), CROSSING_POWER, 1.0 / CROSSING_POWER);
+        }
+        let i = place(who, d, k);
+        position[i] = x;
+        velocity[i] = 0.0;
+    }
+}
+
+// The coordinate of `one`, or one of the two children of both, by a word at random.
+fn cross_coordinates(one: f32, other: f32, word: u32, uniform_draw: f32) -> f32 {
+    let below_both = word < 0x40000000u;
+    let low = select(other, one, one < other);
+    let high = select(one, other, one < other);
+    let gap = high - low;
+    // Of two that are the same there is no other.
+    if word >= 0x80000000u || gap == 0.0 { return one; }
+    let room = select(1.0 - high, low, below_both);
+    let share = uniform_draw * (2.0 - own_power(gap / (gap + (room + room)), CROSSING_POWER));
+    let near = share <= 1.0;
+    let root = own_power(select(2.0 - share, share, near), 1.0 / CROSSING_POWER);
+    let half = 0.5 * (gap * select(1.0 / root, root, near));
+    let middle = 0.5 * (low + high);
+    return held(select(middle + half, middle - half, below_both));
+}
+
+fn polynomial(x: f32, uniform_draw: f32, exponent: f32, inverse: f32) -> f32 {
     let low = uniform_draw < 0.5;
     let part = select(2.0 - (uniform_draw + uniform_draw), uniform_draw + uniform_draw, low);
     let room = select(x, 1.0 - x, low);
-    let base = part + (1.0 - part) * own_power(room, generation.mutation_power);
-    let step = own_power(base, generation.mutation_root) - 1.0;
+    let base = part + (1.0 - part) * own_power(room, exponent);
+    let step = own_power(base, inverse) - 1.0;
     return held(select(x - step, x + step, low));
 }

@@ -1,7 +1,7 @@
 //! The archive of solutions that nothing found so far dominates.
 
 use super::Front;
-use super::metrics::{COLUMNS, Columns, dominates, exclusive_of, non_dominated, touches_of};
+use super::metrics::{Columns, dominates, non_dominated};
 use super::settings::{MopsoSettings, Truncation, setting};
 use super::space::Space;
 use crate::error::Result;
@@ -18,15 +18,23 @@ pub struct Archive {
     pub positions: Vec<Vec<f64>>,
     /// Objectives, one row per member.
     pub objectives: Vec<Vec<f64>>,
-    /// What each member alone dominates and the far corner of the box that this lies in; kept only for
-    /// truncation by it.
-    shares: Vec<(f64, [f64; COLUMNS])>,
+    /// What each member alone dominates; kept only for truncation by it.
+    shares: Vec<Share>,
     /// The objectives once more, for the shares.
     columns: Columns,
     /// The reference point of the shares.
     reference: Vec<f64>,
     /// Whether that stays where it is.
     fixed: bool,
+}
+
+/// What a member alone dominates, as far as it was needed.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct Share {
+    /// No less than this,
+    least: f64,
+    /// and no more if this is set.
+    exact: bool,
 }
 
 impl MopsoSettings {
@@ -48,12 +56,11 @@ impl MopsoSettings {
     }
 }
 
-/// Most objectives of which an archive knows contributions up to a reference that is given,
+/// Most objectives of which an archive knows contributions,
 pub(super) const MOST_MEASURED: usize = 5;
-/// and up to one that moves with the members, which costs more,
-const MOST_MOVING: usize = 4;
-/// with four objectives in archives of no more members than these.
-const FEW: usize = 200;
+/// and of which it does without a reference in archives of more members than [`FEW`], for the time that they take.
+const MOST_OF_MANY: usize = 4;
+const FEW: usize = 1000;
 
 /// The reference point lies this share of the archive's range beyond its worst values, so that extremes count.
 const BEYOND: f64 = 0.1;
@@ -133,11 +140,16 @@ impl Archive {
                 i += 1;
             }
         }
-        let before = (self.len() >= self.capacity).then(|| (self.shares.clone(), self.reference.clone()));
+        let full = self.len() >= self.capacity;
+        if full && self.by_contribution() {
+            // What this works out lasts if nothing comes of the new one.
+            self.least();
+        }
+        let before = full.then(|| (self.shares.clone(), self.reference.clone()));
         self.objectives.push(objectives.to_vec());
         self.positions.push(position.to_vec());
         if self.by_contribution() {
-            self.shares.push((0.0, [f64::INFINITY; COLUMNS]));
+            self.shares.push(Share::default());
             self.columns.push(objectives);
             self.refresh(objectives, true);
         }
@@ -180,7 +192,7 @@ impl Archive {
         self.shares.clear();
         self.columns.clear();
         if self.by_contribution() {
-            self.shares = vec![(0.0, [f64::INFINITY; COLUMNS]); self.len()];
+            self.shares = vec![Share::default(); self.len()];
             self.objectives.iter().for_each(|row| self.columns.push(row));
             // No point lies at it, so that all shares are worked out.
             self.reference.clear();
@@ -188,7 +200,8 @@ impl Archive {
             self.refresh(&first, false);
         }
         while self.len() > self.capacity {
-            self.drop_least(self.least());
+            let least = self.least();
+            self.drop_least(least);
         }
     }
 
@@ -208,8 +221,12 @@ impl Archive {
     }
 
     /// The member that contributes least and is not the best in any objective.
-    fn least(&self) -> usize {
-        let mut worth = self.worth();
+    fn least(&mut self) -> usize {
+        let by_contribution = self.by_contribution();
+        let mut worth = match by_contribution {
+            true => self.shares.iter().map(|share| share.least).collect(),
+            false => self.worth(),
+        };
         // The ends of a front are what its users look for first.
         let privileged = if self.fixed { 0 } else { self.objectives[0].len() };
         for k in 0..privileged {
@@ -218,9 +235,23 @@ impl Archive {
                 worth[end] = f64::INFINITY;
             }
         }
-        (0..self.len())
-            .min_by(|&a, &b| worth[a].total_cmp(&worth[b]))
-            .unwrap_or(0)
+        if by_contribution {
+            // No share is less than these may be.
+            for (i, worth) in worth.iter_mut().enumerate() {
+                if *worth <= 0.0 {
+                    *worth = self.known(i);
+                }
+            }
+        }
+        loop {
+            let least = (0..self.len()).min_by(|&a, &b| worth[a].total_cmp(&worth[b]));
+            let Some(least) = least else { return 0 };
+            if !by_contribution || self.shares[least].exact || worth[least].is_infinite() {
+                return least;
+            }
+            // Those of the others are no less, and need not be known.
+            worth[least] = self.known(least);
+        }
     }
 
     /// Removes member `least`; the shares of the others grow by what was its.
@@ -250,7 +281,8 @@ impl Archive {
     /// How much each member contributes, by the measure that truncation uses.
     pub fn worth(&self) -> Vec<f64> {
         if self.by_contribution() {
-            return self.shares.iter().map(|s| s.0).collect();
+            let exact = |(i, share): (usize, &Share)| if share.exact { share.least } else { self.share(i) };
+            return self.shares.iter().enumerate().map(exact).collect();
         }
         match self.truncation {
             Truncation::Crowding => self.crowding(),
@@ -258,12 +290,29 @@ impl Archive {
         }
     }
 
+    /// What member `i` alone dominates, worked out once.
+    fn known(&mut self, i: usize) -> f64 {
+        if !self.shares[i].exact {
+            self.shares[i] = Share {
+                least: self.share(i),
+                exact: true,
+            };
+        }
+        self.shares[i].least
+    }
+
+    /// Works out what the members contribute, once for all that ask.
+    pub(super) fn measure(&mut self) {
+        for i in 0..self.shares.len() {
+            self.known(i);
+        }
+    }
+
     fn by_contribution(&self) -> bool {
         let width = self.objectives.first().map_or(0, Vec::len);
         let most = match self.fixed {
-            true => MOST_MEASURED,
-            false if self.capacity <= FEW => MOST_MOVING,
-            false => COLUMNS,
+            false if self.capacity > FEW => MOST_OF_MANY,
+            _ => MOST_MEASURED,
         };
         self.truncation == Truncation::Contribution && width <= most
     }
@@ -289,35 +338,40 @@ impl Archive {
             (0..change.len()).map(beyond).collect()
         };
         let moved = reference != self.reference;
-        self.reference = reference;
+        let before = std::mem::replace(&mut self.reference, reference);
+        if moved {
+            // Where it comes nearer, members lose no more than what their boxes do.
+            let nearer: Vec<f64> = before
+                .iter()
+                .zip(&self.reference)
+                .map(|(a, b)| a.min(*b))
+                .collect();
+            for (share, row) in self.shares.iter_mut().zip(&self.objectives) {
+                let room =
+                    |end: &[f64]| -> f64 { end.iter().zip(row).map(|(end, x)| (end - x).max(0.0)).product() };
+                share.least = (share.least - (room(&before) - room(&nearer))).max(0.0);
+                share.exact = false;
+            }
+        }
         let new = came.then(|| self.len() - 1);
-        for i in 0..self.len() {
-            // Only what lies at or below the corner of a member's box touches its share, and only where no other lies between:
-            // on a front that is nearly a curve, its neighbours.
-            let reaches = |corner: &[f64; COLUMNS]| change.iter().zip(corner).all(|(x, corner)| x <= corner);
-            let touched =
-                moved || new == Some(i) || (reaches(&self.shares[i].1) && self.touches(change, new, i));
-            if touched {
-                self.shares[i] = self.share(i);
+        for (i, most) in self.touched(change, new) {
+            let share = &mut self.shares[i];
+            share.exact = false;
+            if came {
+                // What a newcomer takes, they dominate both.
+                share.least = (share.least - most).max(0.0);
             }
         }
     }
 
-    /// What member `i` alone dominates, and the far corner of the box that this lies in.
-    fn share(&self, i: usize) -> (f64, [f64; COLUMNS]) {
-        if self.reference.len() > COLUMNS {
-            let share = exclusive_of(&self.objectives, i, &self.reference);
-            return (share, [f64::INFINITY; COLUMNS]);
-        }
+    /// What member `i` alone dominates.
+    fn share(&self, i: usize) -> f64 {
         self.columns.exclusive(i, &self.reference)
     }
 
-    /// Whether a point that came, as a member, or left can have changed what member `i` alone dominates.
-    fn touches(&self, change: &[f64], came: Option<usize>, i: usize) -> bool {
-        if self.reference.len() > COLUMNS {
-            return touches_of(&self.objectives, change, came, i, &self.reference);
-        }
-        self.columns.touches(change, came, i, &self.reference)
+    /// The members of which a point that came, as a member, or left can have changed what they alone dominate.
+    fn touched(&self, change: &[f64], came: Option<usize>) -> Vec<(usize, f64)> {
+        self.columns.touched(change, came, &self.reference)
     }
 
     fn range(&self, k: usize) -> (f64, f64) {
@@ -468,9 +522,6 @@ mod tests {
     fn shares_stay_exact() {
         for width in [2, 3, 4, 5] {
             let mut archive = Archive::new(15, Truncation::Contribution);
-            if width > COLUMNS {
-                archive = archive.measured_from(vec![70.0; width]);
-            }
             for p in points(width as u32, 600) {
                 archive.insert(&p, &p);
                 let fresh = contributions(&archive.objectives, &archive.reference).unwrap();

@@ -7,8 +7,9 @@
 use super::archive::Archive;
 use super::checkpoint::Checkpoint;
 use super::mopso::blocks::Generation;
+use super::mopso::earnings::Earnings;
 use super::mopso::filter::{Point, front};
-use super::mopso::large_swarm::{leaders, learn_from};
+use super::mopso::large_swarm::{leaders, learn_from, take_in};
 use super::mopso::thinning::{PER_PLACE, thinned};
 use super::settings::MopsoSettings;
 use super::space::Space;
@@ -52,6 +53,7 @@ pub struct DeviceState {
     pub(super) best_position: Vec<f32>,
     pub(super) best_objectives: Vec<f32>,
     pub(super) archive: Archive,
+    pub(super) earnings: Earnings,
     pub(super) counters: Counters,
 }
 
@@ -92,6 +94,7 @@ pub struct DeviceMopso {
     kernels: Kernels,
     buffers: Buffers,
     archive: Archive,
+    earnings: Earnings,
     counters: Counters,
 }
 
@@ -212,6 +215,7 @@ impl DeviceMopso {
         };
         let swarm = Self {
             archive,
+            earnings: Earnings::default(),
             objectives: width,
             settings,
             space,
@@ -264,6 +268,7 @@ impl DeviceMopso {
             space: self.space.clone(),
             objectives: self.objectives,
             archive: self.archive.clone(),
+            earnings: self.earnings.clone(),
             counters: self.counters,
         })
     }
@@ -290,6 +295,7 @@ impl DeviceMopso {
             swarm.context.write(buffer, bytemuck::cast_slice(rows));
         }
         Ok(Self {
+            earnings: state.earnings,
             counters: state.counters,
             ..swarm
         })
@@ -306,10 +312,15 @@ impl DeviceMopso {
         (3 * self.space.dimensions() + 2 * self.objectives) * size_of::<f32>() + 16
     }
 
-    /// Tells the kernels of the present iteration and of so many members.
-    fn announce(&self, members: usize) {
+    /// What is the same for all particles in the present iteration, with so many members.
+    fn generation(&self, members: usize) -> Generation {
         let sizes = (self.space.dimensions(), self.objectives, members);
-        let generation = Generation::new(&self.settings, sizes, self.counters.iteration);
+        Generation::new(&self.settings, &self.earnings, sizes, self.counters.iteration)
+    }
+
+    /// Tells the kernels of it.
+    fn announce(&self, members: usize) {
+        let generation = self.generation(members);
         self.context
             .write(&self.buffers.generation, bytemuck::bytes_of(&generation));
     }
@@ -453,17 +464,15 @@ impl DeviceMopso {
             self.archive.fixed_reference(),
         );
         let rows = self.gather(&points)?;
-        let solution = |(p, row): (&Point, &[f32])| {
-            let position = row.iter().map(|x| f64::from(*x)).collect();
-            (position, p.at[..self.objectives].to_vec())
-        };
-        let solutions = points.iter().zip(rows.chunks_exact(d)).map(solution);
-        self.archive.insert_all(solutions.collect(), 0.0);
+        let position = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect();
+        let solutions = points.into_iter().zip(rows.chunks_exact(d).map(position));
+        let generation = self.generation(members.len());
+        let solutions = solutions.collect();
+        take_in(&mut self.archive, &mut self.earnings, &generation, solutions, 0.0);
         self.counters.told(self.settings.motion.population);
-        self.context.write(
-            &self.buffers.archive,
-            bytemuck::cast_slice(&leaders(&self.archive)),
-        );
+        let leaders = leaders(&mut self.archive);
+        self.context
+            .write(&self.buffers.archive, bytemuck::cast_slice(&leaders));
         // The host goes on meanwhile: the evaluation that follows waits for it.
         self.announce(self.archive.len());
         self.context

@@ -209,8 +209,8 @@ pub enum Leaders {
 pub enum Truncation {
     /// The least crowding distance \[5\].
     Crowding,
-    /// The least volume that a member alone dominates \[8\]. With a reference this is for up to five objectives. Without one it is
-    /// for up to four, and for up to three in an archive of more than 200 members. Beyond, it is `MutualNearest`.
+    /// The least volume that a member alone dominates \[8\], for up to five objectives. In an archive of more than 1,000 members
+    /// without a reference it is for up to four. Beyond, it is `MutualNearest`.
     Contribution,
     /// The least distance to the nearest neighbour, then to the next \[9\].
     MutualNearest,
@@ -254,8 +254,8 @@ impl Mutation {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MopsoSettings {
     /// The motion's settings. A difference move goes from an archive member along the difference of two others
-    /// \[7\]. A swarm that is told one candidate after the other takes their share as where to begin: it makes more or fewer of
-    /// them by what they earn, and crossings of two members besides, as genetic algorithms do. A share of zero or one stays.
+    /// \[7\]. Their share is where the swarm begins: it makes more or fewer of them by what they earn, and crossings of two members
+    /// besides, as genetic algorithms do. A share of zero or one stays.
     pub motion: PsoSettings,
     /// Most members of the archive.
     pub archive: usize,

@@ -150,11 +150,7 @@ pub(super) fn search_front(
         .map(|k| across(k).fold(middle[k], f64::max))
         .collect();
     let shares = Scale::between(&ideal, &reference).apply(&archive.objectives);
-    let volume = if (2..=3).contains(&ideal.len()) {
-        hypervolume(&shares, &vec![1.0; ideal.len()])?
-    } else {
-        f64::NAN
-    };
+    let volume = hypervolume(&shares, &vec![1.0; ideal.len()])?;
     let mut losses = state.losses;
     losses.note(&FailureCounts::new(), &mut judging, judge.as_ref());
     Ok(LineFront {

@@ -2,7 +2,7 @@
 
 use super::KeptRow;
 use crate::error::Result;
-use crate::swarm::metrics::{hypervolume, non_dominated};
+use crate::swarm::metrics::{MOST_OBJECTIVES, hypervolume, non_dominated};
 use std::collections::BTreeMap;
 
 /// The reference point, in ranges of the joint front from its best.
@@ -54,10 +54,11 @@ impl Ranges {
 /// # Errors
 /// Those of [`hypervolume`].
 pub(super) fn compare(rows: &mut [KeptRow], problems: &[usize]) -> Result<()> {
-    // Volumes are worked out in two and three dimensions.
     let width_of = |kept: &KeptRow| {
         let first = kept.row.front.first();
-        first.map(Vec::len).filter(|width| (2..=3).contains(width))
+        first
+            .map(Vec::len)
+            .filter(|width| (2..=MOST_OBJECTIVES).contains(width))
     };
     let mut of_problem: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (place, kept) in rows.iter().enumerate() {
@@ -122,6 +123,8 @@ mod tests {
             row(0, vec![vec![0.0, 3.0], vec![2.0, 1.0]]),
             row(2, vec![vec![1.0, 2.0], vec![3.0, 0.0]]),
             row(3, vec![vec![5.0, 6.0], vec![7.0, 5.0]]),
+            row(4, vec![vec![2.0, 2.0, 2.0, 3.0]]),
+            row(5, vec![vec![3.0, 3.0, 3.0, 2.0]]),
         ];
         let reached = |front: &[Vec<f64>]| Reached {
             front: front.to_vec(),
@@ -130,7 +133,7 @@ mod tests {
         rows[0].searched.reached = vec![reached(&[vec![2.0, 1.0]]), reached(&rows[0].row.front)];
         rows[1].searched.reached = vec![reached(&rows[1].row.front)];
         // The run of number 1 has failed.
-        compare(&mut rows, &[0, 0, 0, 1]).unwrap();
+        compare(&mut rows, &[0, 0, 0, 1, 2, 2]).unwrap();
         let share = |i: usize| rows[i].row.figures[SHARE].unwrap();
         // On a scale of 3: the joint front's staircase under 3.3 has 0.3 + 1.3 + 2.3 + 3.3 columns less what lies beyond.
         let whole = 0.3 + 1.3 + 2.3 + 3.3 * 0.3;
@@ -138,6 +141,9 @@ mod tests {
         assert!((share(0) - first / whole).abs() < 1e-12, "{}", share(0));
         assert!((share(1) - second / whole).abs() < 1e-12, "{}", share(1));
         assert_eq!(share(2), 1.0);
+        let [long, short] = [1.1 * 1.1 * 1.1 * 0.1, 0.1 * 0.1 * 0.1 * 1.1];
+        let four = long / (long + short - 0.1 * 0.1 * 0.1 * 0.1);
+        assert!((share(3) - four).abs() < 1e-12, "{}", share(3));
         let half = rows[0].searched.reached[0].best.unwrap();
         assert!((half - 1.3 * 2.3 / whole).abs() < 1e-12, "{half}");
     }

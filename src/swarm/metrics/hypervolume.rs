@@ -1,13 +1,14 @@
 //! Exact hypervolume.
 
+use super::columns::{COLUMNS, Columns};
 use super::staircase::Staircase;
 use crate::error::{Error, Result};
 
-/// Most objectives of a hypervolume: the work multiplies with each.
-pub(super) const WIDEST: usize = 8;
+/// Most objectives of a [`hypervolume`]: the work multiplies with each.
+pub const MOST_OBJECTIVES: usize = 8;
 
 /// A point, of which the first objectives count.
-pub(super) type Point = [f64; WIDEST];
+pub(super) type Point = [f64; MOST_OBJECTIVES];
 
 /// A row of objectives as a point.
 pub(super) fn point(row: &[f64]) -> Point {
@@ -22,7 +23,7 @@ pub(super) fn point(row: &[f64]) -> Point {
 /// [`Error::Input`] if the number of objectives is not one to eight or rows differ from the reference in width.
 pub fn hypervolume(points: &[Vec<f64>], reference: &[f64]) -> Result<f64> {
     let width = reference.len();
-    if !(1..=WIDEST).contains(&width) || points.iter().any(|p| p.len() != width) {
+    if !(1..=MOST_OBJECTIVES).contains(&width) || points.iter().any(|p| p.len() != width) {
         let found = points.iter().find(|p| p.len() != width).map_or(width, Vec::len);
         let found = format!("{found} objectives, a reference of {width}");
         return Err(Error::input(
@@ -44,6 +45,18 @@ pub(super) fn volume(points: &mut [Point], reference: &[f64]) -> f64 {
         [end] => points.iter().map(|p| end - p[0]).fold(0.0, f64::max),
         [right, top] => area(points, [right, top]),
         [right, top, ceiling] => sweep(points, [right, top], ceiling),
+        [ref before @ .., end] if before.len() <= COLUMNS => {
+            // Each point in turn, the best in the last objective first: those before it reach at least as far along it as the point
+            // itself does.
+            let last = before.len();
+            points.sort_by(|a, b| a[last].total_cmp(&b[last]));
+            let mut columns = Columns::default();
+            let own = |(i, point): (usize, &Point)| {
+                columns.push(&point[..last]);
+                (end - point[last]) * columns.exclusive(i, before)
+            };
+            points.iter().enumerate().map(own).fold(0.0, |sum, own| sum + own)
+        }
         [ref before @ .., end] => {
             // Each point in turn, the worst in the last objective first: those after it are no worse there, so that they all reach
             // as far along it as the point itself does.

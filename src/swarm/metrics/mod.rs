@@ -18,6 +18,7 @@
 //!    optimization*, IEEE TEC 19 (2015) (fronts by bisection).
 //! 7. While, Bradstreet, Barone, *A fast way of calculating exact hypervolumes*, IEEE TEC 16 (2012) (four objectives and more).
 
+mod columns;
 mod contribution;
 mod hypervolume;
 mod indicators;
@@ -26,9 +27,9 @@ mod ranks;
 mod significance;
 mod staircase;
 
+pub(super) use columns::Columns;
 pub use contribution::contributions;
-pub(super) use contribution::{COLUMNS, Columns, exclusive_of, touches_of};
-pub use hypervolume::hypervolume;
+pub use hypervolume::{MOST_OBJECTIVES, hypervolume};
 pub use indicators::{Scale, epsilon, igd_plus, nearest_to_ideal, spread};
 pub(super) use non_dominated::dominates;
 pub use non_dominated::non_dominated;

@@ -1,10 +1,12 @@
 //! Particles in blocks of lanes, and how they move. Twin of `shaders/swarm.wgsl`, with the same operations. The kernel moves a
-//! particle in one pass over its coordinates, for memory's sake; lanes take the few difference moves and mutations one by one.
+//! particle in one pass over its coordinates, for memory's sake; lanes take difference moves and mutations one by one, and
+//! crossings a few at a time.
 //!
 //! Positions and velocities are single precision: a coordinate in the unit cube is known to 6e-8 of its range.
 //! Every loop over the lanes of a block is plain arithmetic without branches, which the compiler turns into vector
 //! instructions. Results depend neither on the instruction set nor on how blocks are spread over threads.
 
+use super::earnings::{Earnings, Move};
 use crate::evaluate::resident::BLOCK;
 use crate::random::{Random, below_u32, unit_f32};
 use crate::scalar::elementary::power;
@@ -19,6 +21,10 @@ pub const UNKNOWN: f32 = f32::MAX;
 /// Share of the difference that a difference move takes, and of the coordinates that it changes, as for small swarms.
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
+/// One more than the distribution index of the crossover and the mutation of a crossing.
+const CROSSING_POWER: f32 = 21.0;
+/// Particles whose crossings are reckoned together.
+const SIDE_BY_SIDE: usize = 16;
 
 /// What is the same for all particles of a generation. Twin of `Generation` in `shaders/swarm.wgsl`.
 #[repr(C)]
@@ -42,8 +48,6 @@ pub struct Generation {
     pub per_dimension: u32,
     /// Whether leaders are the better of two.
     pub tournament: u32,
-    /// Whether there is mutation.
-    pub mutation: u32,
     /// Inertia.
     pub inertia: f32,
     /// Pull to the own best.
@@ -54,8 +58,10 @@ pub struct Generation {
     pub speed_limit: f32,
     /// What a velocity is multiplied by at a bound.
     pub rebound: f32,
-    /// Share of difference moves.
-    pub difference_share: f32,
+    /// Share of crossings.
+    pub crossings: f32,
+    /// Share of crossings and difference moves together.
+    pub no_pulls: f32,
     /// Share of the particles that polynomial mutation disturbs.
     pub mutation_share: f32,
     /// One more than the distribution index of polynomial mutation.
@@ -70,6 +76,7 @@ impl Generation {
     /// For the moves of iteration `when`, with `members` in the archive.
     pub fn new(
         settings: &MopsoSettings,
+        earnings: &Earnings,
         (dimensions, objectives, members): (usize, usize, usize),
         when: usize,
     ) -> Self {
@@ -84,6 +91,7 @@ impl Generation {
                 (chi, chi * cognitive, chi * social)
             }
         };
+        let [crossings, no_pulls] = earnings.shares(motion.difference_share);
         // A swarm in single precision has no trials: `LargeSwarm::new` refuses them.
         let (mutation_share, index) = match motion.mutation {
             Mutation::Polynomial { share, index } => (share, index),
@@ -99,7 +107,6 @@ impl Generation {
             signed: u32::from(motion.constriction == Constriction::Signed),
             per_dimension: u32::from(motion.randomness == Randomness::PerDimension),
             tournament: u32::from(settings.leaders == Leaders::Tournament),
-            mutation: u32::from(mutation_share > 0.0),
             inertia: inertia as f32,
             cognitive: cognitive as f32,
             social: social as f32,
@@ -109,12 +116,31 @@ impl Generation {
                 BoundHandling::Bounce => -0.5,
                 BoundHandling::Reverse => -1.0,
             },
-            difference_share: motion.difference_share as f32,
+            crossings: crossings as f32,
+            no_pulls: no_pulls as f32,
             mutation_share: mutation_share as f32,
             mutation_power: (index + 1.0) as f32,
             mutation_root: (1.0 / (index + 1.0)) as f32,
             pulls: [DRAWN_PULLS[0] as f32, (DRAWN_PULLS[1] - DRAWN_PULLS[0]) as f32],
         }
+    }
+
+    /// The move that falls to a word at random.
+    #[inline(always)]
+    pub fn choice(&self, word: u32) -> Move {
+        let uniform = unit_f32(word);
+        if uniform < self.crossings {
+            Move::Crossing
+        } else if uniform < self.no_pulls {
+            Move::Difference
+        } else {
+            Move::Pull
+        }
+    }
+
+    /// The move that a particle has made.
+    pub fn made_by(&self, who: u32) -> Move {
+        self.choice(self.words(Purpose::Recombine, who, 0)[0])
     }
 
     #[inline(always)]
@@ -264,15 +290,27 @@ pub fn advance(
             x[lane] = inside;
         }
     }
+    let (mut crossed, mut children) = ([0; BLOCK], 0);
     for lane in 0..BLOCK {
         let who = first + lane as u32;
-        if unit_f32(choice[0][lane]) < g.difference_share {
-            let from = leader[lane] as usize;
-            difference(g, who, lane, (leaders, from), (position, velocity));
+        match g.choice(choice[0][lane]) {
+            Move::Crossing => {
+                crossed[children] = lane;
+                children += 1;
+                continue;
+            }
+            Move::Difference => {
+                let from = leader[lane] as usize;
+                difference(g, who, lane, (leaders, from), (position, velocity));
+            }
+            Move::Pull => (),
         }
-        if g.mutation == 1 && unit_f32(choice[3][lane]) < g.mutation_share {
+        if unit_f32(choice[3][lane]) < g.mutation_share {
             disturb(g, who, lane, position);
         }
+    }
+    for few in crossed[..children].chunks(SIDE_BY_SIDE) {
+        cross_few(g, first, few, (leaders, &leader), (position, velocity));
     }
 }
 
@@ -302,6 +340,69 @@ fn difference(
     }
 }
 
+/// To places between or about two archive members, each coordinate by itself, disturbed by polynomial mutation; the particles
+/// of a few lanes side by side.
+#[inline(always)]
+fn cross_few(
+    g: &Generation,
+    first: u32,
+    lanes: &[usize],
+    (leaders, leader): (&[f32], &[u32; BLOCK]),
+    (position, velocity): (&mut [f32], &mut [f32]),
+) {
+    let d = g.dimensions as usize;
+    let (mut who, mut ones, mut others) = ([first; SIDE_BY_SIDE], [0; SIDE_BY_SIDE], [0; SIDE_BY_SIDE]);
+    for (i, lane) in lanes.iter().enumerate() {
+        who[i] = first + *lane as u32;
+        ones[i] = leader[*lane] as usize * d;
+        others[i] = below_u32(g.words(Purpose::Recombine, who[i], 1)[0], g.members) as usize * d;
+    }
+    for k in 0..d {
+        let mut words = [[0; SIDE_BY_SIDE]; 4];
+        for i in 0..SIDE_BY_SIDE {
+            let four = g.words(Purpose::Recombine, who[i], 2 + k as u32);
+            for (plane, word) in words.iter_mut().zip(four) {
+                plane[i] = word;
+            }
+        }
+        let (mut one, mut other) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
+        for i in 0..lanes.len() {
+            (one[i], other[i]) = (leaders[ones[i] + k], leaders[others[i] + k]);
+        }
+        let mut child = [0.0; SIDE_BY_SIDE];
+        for i in 0..SIDE_BY_SIDE {
+            child[i] = cross(one[i], other[i], words[0][i], unit_f32(words[1][i]));
+        }
+        for (i, lane) in lanes.iter().enumerate() {
+            let mut x = child[i];
+            if unit_f32(words[2][i]) * (d as f32) < 1.0 {
+                x = polynomial(x, unit_f32(words[3][i]), (CROSSING_POWER, 1.0 / CROSSING_POWER));
+            }
+            position[k * BLOCK + lane] = x;
+            velocity[k * BLOCK + lane] = 0.0;
+        }
+    }
+}
+
+/// The coordinate of `one`, or one of the two children of both, by a word at random.
+#[inline(always)]
+fn cross(one: f32, other: f32, word: u32, uniform: f32) -> f32 {
+    let below = word < 1 << 30;
+    let low = if one < other { one } else { other };
+    let high = if one < other { other } else { one };
+    let gap = high - low;
+    let room = if below { low } else { 1.0 - high };
+    let share = uniform * (2.0 - power(gap / (gap + (room + room)), CROSSING_POWER));
+    let near = share <= 1.0;
+    let root = power(if near { share } else { 2.0 - share }, 1.0 / CROSSING_POWER);
+    let half = 0.5 * (gap * if near { root } else { 1.0 / root });
+    let middle = 0.5 * (low + high);
+    let moved = if below { middle - half } else { middle + half };
+    let child = moved.clamp(0.0, 1.0);
+    // Of two that are the same there is no other.
+    if word < 1 << 31 && gap > 0.0 { child } else { one }
+}
+
 /// Polynomial mutation of each coordinate with probability one over their number.
 #[inline(always)]
 fn disturb(g: &Generation, who: u32, lane: usize, position: &mut [f32]) {
@@ -313,14 +414,14 @@ fn disturb(g: &Generation, who: u32, lane: usize, position: &mut [f32]) {
         let pair = 2 * (k % 2);
         if unit_f32(words[pair]) * (g.dimensions as f32) < 1.0 {
             let x = &mut position[k * BLOCK + lane];
-            *x = polynomial(g, *x, unit_f32(words[pair + 1]));
+            *x = polynomial(*x, unit_f32(words[pair + 1]), (g.mutation_power, g.mutation_root));
         }
     }
 }
 
 /// As for small swarms, in single precision.
 #[inline(always)]
-fn polynomial(g: &Generation, x: f32, uniform: f32) -> f32 {
+fn polynomial(x: f32, uniform: f32, (exponent, root): (f32, f32)) -> f32 {
     let low = uniform < 0.5;
     let part = if low {
         uniform + uniform
@@ -328,8 +429,8 @@ fn polynomial(g: &Generation, x: f32, uniform: f32) -> f32 {
         2.0 - (uniform + uniform)
     };
     let room = if low { 1.0 - x } else { x };
-    let base = part + (1.0 - part) * power(room, g.mutation_power);
-    let step = power(base, g.mutation_root) - 1.0;
+    let base = part + (1.0 - part) * power(room, exponent);
+    let step = power(base, root) - 1.0;
     let moved = if low { x + step } else { x - step };
     moved.clamp(0.0, 1.0)
 }

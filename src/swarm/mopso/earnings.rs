@@ -21,7 +21,7 @@ const BEFORE: [f64; 2] = [0.1, 1.0];
 
 /// A kind of move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Move {
+pub enum Move {
     /// Towards a particle's own best and a leader.
     Pull,
     /// From a leader along the difference of two members.
@@ -32,7 +32,7 @@ pub(super) enum Move {
 
 /// Tries and earnings of each kind of move.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Earnings {
+pub struct Earnings {
     tried: [f64; 3],
     earned: [f64; 3],
 }
@@ -42,6 +42,21 @@ impl Earnings {
     pub fn count(&mut self, made: Move, earned: bool) {
         self.tried[made as usize] += 1.0;
         self.earned[made as usize] += f64::from(u8::from(earned));
+    }
+
+    /// Counts an iteration's tries of each kind of move, and how many earned something. What there was fades.
+    pub fn count_all(&mut self, tried: [f64; 3], earned: [f64; 3]) {
+        self.fade();
+        for k in 0..3 {
+            self.tried[k] += tried[k];
+            self.earned[k] += earned[k];
+        }
+    }
+
+    /// The share of crossings, and of these and difference moves together, as of [`Earnings::choice`].
+    pub fn shares(&self, usual: f64) -> [f64; 2] {
+        let crossings = self.crossings(usual);
+        [crossings, crossings + (1.0 - crossings) * self.differences(usual)]
     }
 
     /// Lets what there is fade, after an iteration.
@@ -55,10 +70,10 @@ impl Earnings {
     /// The move that falls to a uniform random number where the settings say that the share of difference moves among pulls and
     /// differences is `usual`. A swarm of one kind of move keeps to it.
     pub fn choice(&self, usual: f64, uniform: f64) -> Move {
-        let crossings = self.crossings(usual);
+        let [crossings, no_pulls] = self.shares(usual);
         if uniform < crossings {
             Move::Crossing
-        } else if uniform < crossings + (1.0 - crossings) * self.differences(usual) {
+        } else if uniform < no_pulls {
             Move::Difference
         } else {
             Move::Pull

@@ -5,6 +5,7 @@
 //! and its archive. All of it is linear in the particles but for sorting the few that nothing dominates.
 
 use super::blocks::{Generation, UNKNOWN, advance, judge, scatter};
+use super::earnings::Earnings;
 use super::filter::{Point, front, part, point};
 use super::thinning::{PER_PLACE, thinned};
 use crate::error::Result;
@@ -16,6 +17,7 @@ use crate::scalar::lanes::Lanes;
 use crate::swarm::archive::Archive;
 #[cfg(feature = "gpu")]
 use crate::swarm::device::DeviceState;
+use crate::swarm::metrics::dominates;
 use crate::swarm::settings::{MopsoSettings, setting};
 use crate::swarm::space::Space;
 use crate::swarm::{Counters, Front, Optimiser};
@@ -42,6 +44,7 @@ pub(super) struct LargeSwarm {
     /// `None` before any violation was told.
     best_violation: Vec<f64>,
     archive: Archive,
+    earnings: Earnings,
     counters: Counters,
 }
 
@@ -183,7 +186,8 @@ impl LargeSwarm {
         let (d, width) = (space.dimensions(), problem.objectives.len());
         let lanes = settings.motion.population.next_multiple_of(BLOCK);
         let random = Random::new(settings.motion.seed);
-        let generation = Generation::new(&settings, (d, width, 0), 0);
+        let earnings = Earnings::default();
+        let generation = Generation::new(&settings, &earnings, (d, width, 0), 0);
         let mut position = vec![0.0; lanes * d];
         position
             .par_chunks_mut((PART * d).max(1))
@@ -208,6 +212,7 @@ impl LargeSwarm {
             random,
             space,
             settings,
+            earnings,
             counters: Counters::default(),
         })
     }
@@ -238,6 +243,7 @@ impl LargeSwarm {
             best_position: self.best_position.clone(),
             best_objectives: self.best_objectives.clone(),
             archive: self.archive.clone(),
+            earnings: self.earnings.clone(),
             counters: self.counters,
         })
     }
@@ -256,6 +262,7 @@ impl LargeSwarm {
             best_objectives: state.best_objectives,
             best_violation: Vec::new(),
             archive: state.archive,
+            earnings: state.earnings,
             counters: state.counters,
         }
     }
@@ -284,7 +291,7 @@ impl LargeSwarm {
 
     fn generation(&self) -> Generation {
         let sizes = (self.space.dimensions(), self.objectives, self.archive.len());
-        Generation::new(&self.settings, sizes, self.counters.iteration)
+        Generation::new(&self.settings, &self.earnings, sizes, self.counters.iteration)
     }
 
     /// The points of the swarm that may enter the archive, and their violation.
@@ -366,7 +373,7 @@ impl LargeSwarm {
         let d = self.space.dimensions();
         let generation = self.generation();
         let random = self.random;
-        let leaders = leaders(&self.archive);
+        let leaders = leaders(&mut self.archive);
         self.position
             .par_chunks_mut(PART * d)
             .zip(self.velocity.par_chunks_mut(PART * d))
@@ -396,12 +403,48 @@ fn pieces(state: &mut [f64], n: usize) -> Vec<&mut [f64]> {
 }
 
 /// The archive's positions, the greatest contribution first.
-pub fn leaders(archive: &Archive) -> Vec<f32> {
+pub fn leaders(archive: &mut Archive) -> Vec<f32> {
+    archive.measure();
     let worth = archive.worth();
     let mut order: Vec<usize> = (0..worth.len()).collect();
     order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
     let coordinate = |i: usize| archive.positions[i].iter().map(|x| *x as f32);
     order.into_iter().flat_map(coordinate).collect()
+}
+
+/// Puts points of the swarm and their positions into the archive, and lets its moves know what they have earned. A move earns where
+/// its candidate takes the place of a member that it dominates.
+pub fn take_in(
+    archive: &mut Archive,
+    earnings: &mut Earnings,
+    generation: &Generation,
+    found: Vec<(Point, Vec<f64>)>,
+    violation: f64,
+) {
+    let width = generation.objectives as usize;
+    let (members, level) = (archive.objectives.clone(), archive.violation());
+    let points: Vec<Point> = found.iter().map(|(point, _)| *point).collect();
+    let row = |point: &Point| point.at[..width].to_vec();
+    let solutions = found.into_iter().map(|(point, position)| (position, row(&point)));
+    archive.insert_all(solutions.collect(), violation);
+    // Before, nobody moved towards anything.
+    if members.is_empty() || generation.when == 0 {
+        return;
+    }
+    let mut earned = [0.0; 3];
+    for point in &points {
+        let row = row(point);
+        let takes = violation < level || members.iter().any(|member| dominates(&row, member));
+        if takes && archive.objectives.contains(&row) {
+            earned[generation.made_by(point.who) as usize] += 1.0;
+        }
+    }
+    let [crossings, no_pulls] = [generation.crossings, generation.no_pulls].map(f64::from);
+    let shares = [1.0 - no_pulls, no_pulls - crossings, crossings];
+    earnings.count_all(
+        shares.map(|share| share * f64::from(generation.particles)),
+        earned,
+    );
 }
 
 /// The front of a part of a swarm by itself.
@@ -433,12 +476,19 @@ impl Optimiser for LargeSwarm {
         let wanted = PER_PLACE * self.settings.archive;
         let found = thinned(found, self.objectives, wanted, self.archive.fixed_reference());
         let d = self.space.dimensions();
-        let positions = found.iter().map(|p| {
-            let at = |k: usize| f64::from(self.position[self.place(p.who as usize, k)]);
-            (0..d).map(at).collect()
-        });
-        let rows = found.iter().map(|p| p.at[..self.objectives].to_vec());
-        self.archive.insert_all(positions.zip(rows).collect(), violation);
+        let solution = |point: Point| {
+            let at = |k: usize| f64::from(self.position[self.place(point.who as usize, k)]);
+            (point, (0..d).map(at).collect())
+        };
+        let solutions = found.into_iter().map(solution).collect();
+        let generation = self.generation();
+        take_in(
+            &mut self.archive,
+            &mut self.earnings,
+            &generation,
+            solutions,
+            violation,
+        );
         self.counters.told(self.settings.motion.population);
         self.advance();
         Ok(())

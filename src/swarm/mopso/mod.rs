@@ -1,7 +1,7 @@
 //! Multi-objective particle swarm with an archive of leaders.
 
 pub(super) mod blocks;
-mod earnings;
+pub(super) mod earnings;
 pub(super) mod filter;
 pub(super) mod large_swarm;
 mod small_swarm;

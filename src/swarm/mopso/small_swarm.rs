@@ -148,6 +148,7 @@ impl SmallSwarm {
 
     fn advance(&mut self) {
         let share = self.counters.iteration as f64 / (self.settings.motion.iterations.max(2) - 1) as f64;
+        self.archive.measure();
         let worth = self.archive.worth();
         for particle in 0..self.settings.motion.population {
             if self.archive.is_empty() {
