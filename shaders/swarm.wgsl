@@ -238,7 +238,9 @@ fn move_one(who: u32, leader: u32, differs: bool, disturbed: bool) {
         if disturbed {
             if k % 2u == 0u { mutation = words(MUTATION, who, k / 2u); }
             let pair = 2u * (k % 2u);
-            if unit(mutation[pair]) * f32(d) < 1.0 { x = polynomial(x, unit(mutation[pair + 1u]), generation.mutation_power, generation.mutation_root); }
+            if unit(mutation[pair]) * f32(d) < 1.0 {
+                x = polynomial(x, unit(mutation[pair + 1u]), generation.mutation_power, generation.mutation_root);
+            }
         }
         velocity[i] = v;
         position[i] = x;
@@ -261,7 +263,7 @@ fn cross_one(who: u32, leader: u32) {
     }
 }
 
-// The coordinate of `one`, or one of the two children of both, by a word at random.
+// The coordinate of `one` by half of the words at random, each of the two children of both by a quarter.
 fn cross_coordinates(one: f32, other: f32, word: u32, uniform_draw: f32) -> f32 {
     let below_both = word < 0x40000000u;
     let low = select(other, one, one < other);

@@ -194,8 +194,6 @@ impl Archive {
         if self.by_contribution() {
             self.shares = vec![Share::default(); self.len()];
             self.objectives.iter().for_each(|row| self.columns.push(row));
-            // No point lies at it, so that all shares are worked out.
-            self.reference.clear();
             let first = self.objectives[0].clone();
             self.refresh(&first, false);
         }

@@ -24,7 +24,7 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Problems: identify (speed, lateral acceleration and yaw rate through Maggotts and Becketts, 22 unknowns), raceline
-    /// (Gamma, length and lap time at Silverstone, from the exact lines)
+    /// (Gamma, length and lap time at Silverstone, from the reference optima)
     #[arg(long, value_delimiter = ',', default_value = "identify,raceline",
           value_parser = PossibleValuesParser::new(PROBLEMS.map(|(name, _)| name)))]
     problems: Vec<String>,
@@ -182,7 +182,7 @@ fn identify(arguments: &Arguments) -> Result<Case<ReplayProblem>> {
     })
 }
 
-/// The box reaches from the best to the worst of each objective among the exact lines and the reference line.
+/// The box reaches from the best to the worst of each objective among the reference optima and the reference line.
 fn raceline(arguments: &Arguments) -> Result<Case<LineProblem>> {
     let settings = RacelineSettings {
         sections: Some(arguments.sections as usize),

@@ -74,7 +74,7 @@ pub struct Generation {
 
 impl Generation {
     /// For the moves of iteration `when`, with `members` in the archive.
-    pub fn new(
+    pub(in crate::swarm) fn new(
         settings: &MopsoSettings,
         earnings: &Earnings,
         (dimensions, objectives, members): (usize, usize, usize),
@@ -127,7 +127,7 @@ impl Generation {
 
     /// The move that falls to a word at random.
     #[inline(always)]
-    pub fn choice(&self, word: u32) -> Move {
+    pub(in crate::swarm) fn choice(&self, word: u32) -> Move {
         let uniform = unit_f32(word);
         if uniform < self.crossings {
             Move::Crossing
@@ -139,7 +139,7 @@ impl Generation {
     }
 
     /// The move that a particle has made.
-    pub fn made_by(&self, who: u32) -> Move {
+    pub(in crate::swarm) fn made_by(&self, who: u32) -> Move {
         self.choice(self.words(Purpose::Recombine, who, 0)[0])
     }
 
@@ -384,7 +384,7 @@ fn cross_few(
     }
 }
 
-/// The coordinate of `one`, or one of the two children of both, by a word at random.
+/// The coordinate of `one` by half of the words at random, each of the two children of both by a quarter.
 #[inline(always)]
 fn cross(one: f32, other: f32, word: u32, uniform: f32) -> f32 {
     let below = word < 1 << 30;

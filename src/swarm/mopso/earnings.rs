@@ -21,7 +21,7 @@ const BEFORE: [f64; 2] = [0.1, 1.0];
 
 /// A kind of move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Move {
+pub(in crate::swarm) enum Move {
     /// Towards a particle's own best and a leader.
     Pull,
     /// From a leader along the difference of two members.
@@ -32,7 +32,7 @@ pub enum Move {
 
 /// Tries and earnings of each kind of move.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Earnings {
+pub(in crate::swarm) struct Earnings {
     tried: [f64; 3],
     earned: [f64; 3],
 }
