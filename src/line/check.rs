@@ -79,8 +79,35 @@ pub struct RoadEdges<'a> {
     closed: bool,
     /// Mean distance between neighbouring cross-sections (m).
     step_m: f64,
+    /// The pieces of the right edge and of the left one.
+    pieces: [Vec<Piece>; 2],
     /// Of the right edge, the left one, and the middles.
     boxes: [Boxes; 3],
+}
+
+/// A straight piece of an edge.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    from: DVec2,
+    /// Its direction, of length one; zero where the piece has no length.
+    way: DVec2,
+    length_m: f64,
+}
+
+impl Piece {
+    /// The pieces of a closed edge.
+    fn of(edge: &[DVec2]) -> Vec<Self> {
+        let ends = edge.iter().cycle().skip(1);
+        let piece = |(from, to): (&DVec2, &DVec2)| {
+            let along = *to - *from;
+            Self {
+                from: *from,
+                way: along.normalize_or_zero(),
+                length_m: along.length(),
+            }
+        };
+        edge.iter().zip(ends).map(piece).collect()
+    }
 }
 
 /// The rectangles about [`TOGETHER`] pieces of a line each: where all of a rectangle is far, so are its pieces.
@@ -127,6 +154,7 @@ impl<'a> RoadEdges<'a> {
             left_m: &left_m[..n],
             closed,
             step_m: 1.0,
+            pieces: [right_m, left_m].map(|edge| Piece::of(&edge[..n])),
             boxes: Default::default(),
         };
         let steps = n - usize::from(!closed && n > 0);
@@ -176,15 +204,6 @@ impl<'a> RoadEdges<'a> {
         own.into_iter().chain(runs)
     }
 
-    /// One of the edges, with its rectangles.
-    fn edge(&self, left: bool) -> (&'a [DVec2], &Boxes) {
-        if left {
-            (self.left_m, &self.boxes[1])
-        } else {
-            (self.right_m, &self.boxes[0])
-        }
-    }
-
     /// The cross-section abreast of each of these points (m), which follow one another along the road.
     pub fn abreast(&self, points_m: &[DVec2]) -> Vec<usize> {
         let [first, second, ..] = points_m else {
@@ -226,31 +245,25 @@ impl<'a> RoadEdges<'a> {
 
     /// Distance of a point inwards from an edge (m), near a cross-section; negative beyond the edge.
     pub fn inside(&self, point: DVec2, abreast: usize, left: bool) -> f64 {
-        let (edge, boxes) = self.edge(left);
+        let (pieces, boxes) = (&self.pieces[usize::from(left)], &self.boxes[usize::from(left)]);
         let mut nearest = f64::MAX;
         let mut leftward = 0.0;
         for run in self.around(abreast, REACH_M, 1) {
             if boxes.distance_squared(run.start, point) > (1.0 + 2.0 * SAME) * nearest {
                 continue;
             }
-            for i in run {
-                let next = if i + 1 < edge.len() { i + 1 } else { 0 };
-                let (from, to) = (edge[i], edge[next]);
-                let along = to - from;
-                let square = along.length_squared();
-                if square == 0.0 {
-                    continue;
-                }
-                let away = point - from;
-                let share = (away.dot(along) / square).clamp(0.0, 1.0);
-                let distance = (away - share * along).length_squared();
-                let same = (distance - nearest).abs() <= SAME * nearest;
-                if !(same || distance < nearest) {
-                    continue;
-                }
-                // How nearly the point lies at right angles to the segment. Where two segments share the nearest point, the one that
+            for piece in &pieces[run] {
+                let away = point - piece.from;
+                // How nearly the point lies at right angles to the piece. Where two pieces share the nearest point, the one that
                 // faces the point decides the side.
-                let facing = along.perp_dot(away) / square.sqrt();
+                let facing = piece.way.perp_dot(away);
+                let along = piece.way.dot(away);
+                let beyond = (along - piece.length_m).max(-along).max(0.0);
+                let distance = facing * facing + beyond * beyond;
+                let same = (distance - nearest).abs() <= SAME * nearest;
+                if !(same || distance < nearest) || piece.length_m == 0.0 {
+                    continue;
+                }
                 if !same || facing.abs() > f64::abs(leftward) {
                     nearest = distance;
                     leftward = facing;
@@ -297,7 +310,7 @@ impl<'a> RoadEdges<'a> {
     /// Where a straight line from a point near a cross-section, in a direction of length one, meets an edge for the first time
     /// (m); nothing where it meets none.
     pub fn meets(&self, point: DVec2, way: DVec2, abreast: usize, left: bool) -> Option<f64> {
-        let (edge, _) = self.edge(left);
+        let edge = if left { self.left_m } else { self.right_m };
         let meeting = |i: usize| {
             let (from, to) = (edge[i], edge[(i + 1) % edge.len()]);
             let (along, apart) = (to - from, from - point);

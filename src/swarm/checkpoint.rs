@@ -18,7 +18,7 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state.
-pub const VERSION: u32 = 11;
+pub const VERSION: u32 = 12;
 
 const MAGIC: &[u8; 8] = b"LAPSWARM";
 /// Bytes of that and the version.

@@ -9,7 +9,7 @@ use super::checkpoint::Checkpoint;
 use super::mopso::blocks::Generation;
 use super::mopso::earnings::Earnings;
 use super::mopso::filter::{Point, front};
-use super::mopso::large_swarm::{leaders, learn_from, take_in};
+use super::mopso::large_swarm::{empty_archive, leaders, learn_from, take_in};
 use super::mopso::thinning::{PER_PLACE, thinned};
 use super::settings::MopsoSettings;
 use super::space::Space;
@@ -85,7 +85,8 @@ struct Buffers {
     gather: wgpu::BindGroup,
 }
 
-/// A swarm of two or three objectives without constraints on a device, with the settings of [`super::Mopso`].
+/// A swarm of one to three objectives without constraints on a device, with the settings of [`super::Mopso`]. With one objective it
+/// is the plain particle swarm: the archive is the best that was found, and every move is a pull towards it and the own best.
 pub struct DeviceMopso {
     settings: MopsoSettings,
     space: Space,
@@ -115,9 +116,9 @@ impl DeviceMopso {
     pub fn new(problem: &Problem, settings: MopsoSettings, context: Arc<GpuContext>) -> Result<Self> {
         let space = Space::new(problem)?;
         let (d, width) = (space.dimensions(), problem.objectives.len());
-        if d == 0 || !(2..=3).contains(&width) {
+        if d == 0 || !(1..=3).contains(&width) {
             let found = format!("{d} free variables, {width} objectives");
-            let expected = "a free variable and two or three objectives";
+            let expected = "a free variable and one to three objectives";
             return Err(Error::input(
                 "the problem",
                 "variables, objectives",
@@ -125,7 +126,7 @@ impl DeviceMopso {
                 expected,
             ));
         }
-        let archive = settings.empty_archive(width)?;
+        let archive = empty_archive(problem, &settings)?;
         let (swarm, scatter) = Self::unborn(settings, space, archive, width, context)?;
         swarm.dispatch(&scatter, 0)?;
         Ok(swarm)

@@ -1,4 +1,5 @@
-//! What looks for a front in a study: a swarm, islands of swarms, or the genetic algorithm that they are compared with.
+//! What looks for a front in a study: a swarm, islands of swarms, or the genetic algorithm that they are compared with. A swarm for
+//! one objective that lives on a device is one of these, too.
 
 use super::trail::Trail;
 use super::{
@@ -22,6 +23,12 @@ pub(crate) struct FrontSearch {
 }
 
 impl FrontSearch {
+    /// One swarm, as a search for one objective is.
+    pub const ONE_SWARM: Self = Self {
+        genetic: false,
+        islands: 1,
+    };
+
     /// Checks that there can be such a search for so many objectives.
     ///
     /// # Errors
@@ -65,6 +72,8 @@ impl FrontSearch {
             "islands"
         } else if settings.motion.mutation.tries() {
             "mutation whose trials are evaluated one by one"
+        } else if objectives == 1 && settings.motion.difference_share > 0.0 {
+            "one objective and another algorithm than thesis"
         } else {
             return place.on_device(backend, settings.motion.population, objectives);
         };
@@ -177,6 +186,13 @@ impl FrontSwarm {
     #[cfg(feature = "gpu")]
     pub fn take_back(&mut self, swarm: Mopso) {
         self.kind = Kind::Swarm(Box::new(swarm));
+    }
+
+    /// Lets go of its particles, once it is done: it is not asked again.
+    pub fn let_particles_go(&mut self) {
+        if let Kind::Swarm(swarm) = &mut self.kind {
+            swarm.let_particles_go();
+        }
     }
 
     /// What it had come to on its way.

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::{BackendChoice, Problem};
 use serde::{Deserialize, Serialize};
 
-/// Where the particles of a swarm of several objectives live. On a device, neither candidates nor objectives cross the bus.
+/// Where the particles of a swarm live. On a device, neither candidates nor objectives cross the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SwarmPlace {
     /// On the device from [`MANY`] particles on, where the backend is one GPU that has room for them; else on the host. A software
@@ -37,17 +37,17 @@ impl SwarmPlace {
     ) -> Result<bool> {
         let gpu = backend.decided(adapter) == BackendChoice::Gpu;
         let one = !crate::evaluate::gpu::asks_for_all(adapter);
-        let several = (2..=3).contains(&objectives);
+        let few = (1..=3).contains(&objectives);
         let refused = |found: String, expected: &str| {
             let found = format!("device, with {found}");
             Err(Error::input("the study", "swarm", found, expected))
         };
         match self {
             Self::Host => Ok(false),
-            Self::Auto => Ok(gpu && one && several && population >= MANY),
-            Self::Device if !several => {
+            Self::Auto => Ok(gpu && one && few && population >= MANY),
+            Self::Device if !few => {
                 let found = format!("{objectives} objectives");
-                refused(found, "two or three objectives, for a swarm on the device")
+                refused(found, "one to three objectives, for a swarm on the device")
             }
             Self::Device if !gpu => refused(
                 "lanes or the reference to evaluate".to_owned(),
@@ -120,6 +120,7 @@ mod tests {
         };
         let gpu = BackendChoice::Gpu;
         assert!(on(SwarmPlace::Auto, gpu, MANY, 3).expect("an answer"));
+        assert!(on(SwarmPlace::Auto, gpu, MANY, 1).expect("an answer"));
         assert!(!on(SwarmPlace::Auto, gpu, MANY - 1, 3).expect("an answer"));
         assert!(!on(SwarmPlace::Auto, gpu, MANY, 4).expect("an answer"));
         assert!(!on(SwarmPlace::Auto, BackendChoice::Simd, MANY, 2).expect("an answer"));
@@ -136,8 +137,7 @@ mod tests {
                 .contains("one adapter")
         );
         for (backend, objectives, reason) in [
-            (gpu, 1, "two or three objectives"),
-            (gpu, 4, "two or three objectives"),
+            (gpu, 4, "one to three objectives"),
             (BackendChoice::Simd, 2, "the backend gpu"),
             (BackendChoice::Cpu, 2, "the backend gpu"),
         ] {

@@ -324,6 +324,15 @@ impl MopsoSettings {
         self
     }
 
+    /// For one objective, with an archive of the best alone: a plain particle swarm that can live on a device.
+    pub(crate) fn of_one_objective(motion: PsoSettings) -> Self {
+        Self {
+            motion,
+            archive: 2,
+            ..Self::thesis()
+        }
+    }
+
     /// The thesis's swarm for several objectives: inertia 0.5 to 0.1, c1 1.5, c2 2.5, mutation with `mu` 0.3.
     pub fn thesis() -> Self {
         Self {

@@ -32,7 +32,7 @@ impl Reached {
     }
 }
 
-/// The way of a search for a front.
+/// The way of a search.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Trail {
     reached: Vec<Reached>,
@@ -53,7 +53,7 @@ impl Trail {
         self.since.get_or_insert_with(Instant::now);
     }
 
-    /// Notes the front after an iteration of the planned number, if it is time to. Iterations that are taken again are not noted
+    /// Notes the front, or the best of one objective, after an iteration of the planned number, if it is time to. Iterations that are taken again are not noted
     /// twice.
     pub fn note(&mut self, now: Counters, planned: usize, front: impl FnOnce() -> Vec<Vec<f64>>) {
         if let Some(since) = self.since.replace(Instant::now()) {
@@ -65,11 +65,15 @@ impl Trail {
             .last()
             .is_none_or(|last| last.evaluations < now.evaluations);
         if is_new && (now.iteration <= 1 || looks(now.iteration) > looks(now.iteration - 1)) {
-            self.reached.push(Reached {
-                evaluations: now.evaluations,
-                elapsed_s: self.elapsed_s,
-                best: None,
-                front: front(),
+            let front = front();
+            self.reached.push(match &front[..] {
+                [only] if only.len() == 1 => Reached::best(now.evaluations, self.elapsed_s, only[0]),
+                _ => Reached {
+                    evaluations: now.evaluations,
+                    elapsed_s: self.elapsed_s,
+                    best: None,
+                    front,
+                },
             });
         }
     }

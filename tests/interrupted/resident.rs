@@ -8,23 +8,25 @@ use lapswarm::evaluate::line::LineObjective;
 use lapswarm::files::run_folder::STATE;
 use lapswarm::study::framework::state_file::StateFile;
 use lapswarm::study::framework::{Study, Work};
-use lapswarm::study::hybrid::{Hybrid, HybridStudySettings};
-use lapswarm::study::identify::{FreeParameter, Identify, IdentifySettings, ObjectiveChoice};
-use lapswarm::study::raceline::{Raceline, RacelineSettings};
-use lapswarm::swarm::{SwarmPlace, checkpoint};
+use lapswarm::study::hybrid::{Hybrid, HybridAlgorithm, HybridStudySettings};
+use lapswarm::study::identify::{Algorithm, FreeParameter, Identify, IdentifySettings, ObjectiveChoice};
+use lapswarm::study::raceline::{LineAlgorithm, Raceline, RacelineSettings};
+use lapswarm::swarm::{Mutation, SwarmPlace, checkpoint};
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Arc;
 
 tests! {
     lines_on_the_device_lose_nothing_to_faults_and_breaks: device,
     cars_on_the_device_lose_nothing_to_faults_and_breaks: device,
     laps_on_the_device_lose_nothing_to_faults_and_breaks: device,
+    swarms_of_one_objective_on_the_device_lose_nothing_to_faults_and_breaks: device,
 }
 
 /// Candidates, objectives and evaluations.
 type Found = (Vec<Vec<f64>>, Vec<Vec<f64>>, u64);
 
-/// A study whose front is looked for on the device.
+/// A study whose front, or best by one objective, is looked for on the device.
 struct Trial<'a, S: Study> {
     settings: &'a S::Settings,
     prepared: S::Prepared,
@@ -115,9 +117,9 @@ fn assert_refused<S: Study>(settings: &S::Settings, reason: &str) {
     assert!(refusal.to_string().contains(reason), "{refusal}");
 }
 
-fn lines_on_the_device_lose_nothing_to_faults_and_breaks() {
-    let _turn = alone();
-    let settings = RacelineSettings {
+/// Lines of a stadium, on the device.
+fn lines() -> RacelineSettings {
+    RacelineSettings {
         track: "stadium:300:80:12".to_owned(),
         sections: Some(60),
         population: 70,
@@ -129,7 +131,12 @@ fn lines_on_the_device_lose_nothing_to_faults_and_breaks() {
         backend: BackendChoice::Gpu,
         swarm: SwarmPlace::Device,
         ..RacelineSettings::default()
-    };
+    }
+}
+
+fn lines_on_the_device_lose_nothing_to_faults_and_breaks() {
+    let _turn = alone();
+    let settings = lines();
     Trial::<Raceline> {
         prepared: Raceline::prepare(&settings).unwrap(),
         settings: &settings,
@@ -167,15 +174,15 @@ fn trial(settings: &IdentifySettings) -> Trial<'_, Identify> {
     }
 }
 
-fn cars_on_the_device_lose_nothing_to_faults_and_breaks() {
-    let _turn = alone();
+/// Cars through a bend, on the device.
+fn cars() -> IdentifySettings {
     let free = [("rBy1", 5.0, 25.0), ("rVy3", -40.0, 40.0), ("C", 3e3, 5e4)];
     let free = free.map(|(name, lower, upper)| FreeParameter {
         name: name.to_owned(),
         lower,
         upper,
     });
-    let settings = IdentifySettings {
+    IdentifySettings {
         section: Some("Abbey".to_owned()),
         free: free.into_iter().collect(),
         objectives: vec![ObjectiveChoice::Channel(1), ObjectiveChoice::Channel(2)],
@@ -186,7 +193,12 @@ fn cars_on_the_device_lose_nothing_to_faults_and_breaks() {
         backend: BackendChoice::Gpu,
         place: SwarmPlace::Device,
         ..IdentifySettings::default()
-    };
+    }
+}
+
+fn cars_on_the_device_lose_nothing_to_faults_and_breaks() {
+    let _turn = alone();
+    let settings = cars();
     trial(&settings).loses_nothing();
     // On the host, from the same cars on, as many fail, and for the same reasons.
     let record = |place, population| {
@@ -213,19 +225,18 @@ fn cars_on_the_device_lose_nothing_to_faults_and_breaks() {
         objectives: vec![ObjectiveChoice::All],
         ..settings.clone()
     };
-    assert_refused::<Identify>(&one, "two or three objectives");
+    assert_refused::<Identify>(&one, "another algorithm than thesis");
 }
 
-fn laps_on_the_device_lose_nothing_to_faults_and_breaks() {
-    let _turn = alone();
-    let folder = tempfile::tempdir().unwrap();
-    let line = folder.path().join("ring.csv");
+/// A lap of an ellipse with a motor, on the device.
+fn laps(folder: &Path) -> HybridStudySettings {
+    let line = folder.join("ring.csv");
     let points = (0..400).map(|i| {
         let angle = std::f64::consts::TAU * f64::from(i) / 400.0;
         format!("{},{}\n", 300.0 * angle.cos(), 180.0 * angle.sin())
     });
     std::fs::write(&line, format!("x_m,y_m\n{}", points.collect::<String>())).unwrap();
-    let settings = HybridStudySettings {
+    HybridStudySettings {
         track: "circle:294:306".to_owned(),
         line: Some(line),
         sections: Some(60),
@@ -236,7 +247,13 @@ fn laps_on_the_device_lose_nothing_to_faults_and_breaks() {
         backend: BackendChoice::Gpu,
         swarm: SwarmPlace::Device,
         ..HybridStudySettings::default()
-    };
+    }
+}
+
+fn laps_on_the_device_lose_nothing_to_faults_and_breaks() {
+    let _turn = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let settings = laps(folder.path());
     Trial::<Hybrid> {
         prepared: Hybrid::prepare(&settings).unwrap(),
         settings: &settings,
@@ -261,5 +278,75 @@ fn laps_on_the_device_lose_nothing_to_faults_and_breaks() {
         objectives: vec![HybridObjective::LapTime],
         ..settings
     };
-    assert_refused::<Hybrid>(&one, "two or three objectives");
+    assert_refused::<Hybrid>(&one, "another algorithm than thesis");
+}
+
+/// The published swarms.
+fn swarms_of_one_objective_on_the_device_lose_nothing_to_faults_and_breaks() {
+    let _turn = alone();
+    let settings = RacelineSettings {
+        algorithm: LineAlgorithm::Thesis,
+        objectives: vec![LineObjective::Length],
+        mutation: Some(Mutation::None),
+        ..lines()
+    };
+    Trial::<Raceline> {
+        prepared: Raceline::prepare(&settings).unwrap(),
+        settings: &settings,
+        stage: LineObjective::Length.line_name(),
+        front: |outcome| {
+            let found = &outcome.objectives[0];
+            (
+                vec![found.best.alpha.clone()],
+                vec![vec![found.swarm_cost]],
+                outcome.record.evaluations,
+            )
+        },
+    }
+    .loses_nothing();
+    let published = RacelineSettings {
+        mutation: None,
+        ..settings
+    };
+    assert_refused::<Raceline>(&published, "trials are evaluated one by one");
+
+    let settings = IdentifySettings {
+        algorithm: Algorithm::Thesis,
+        objectives: vec![ObjectiveChoice::All],
+        ..cars()
+    };
+    Trial::<Identify> {
+        front: |outcome| {
+            assert!(outcome.front.is_none());
+            let last = outcome.history.last().expect("rows");
+            (
+                vec![outcome.swarm_candidate.clone()],
+                vec![last.best.clone()],
+                last.evaluations,
+            )
+        },
+        ..trial(&settings)
+    }
+    .loses_nothing();
+
+    let folder = tempfile::tempdir().unwrap();
+    let settings = HybridStudySettings {
+        algorithm: HybridAlgorithm::Thesis,
+        objectives: vec![HybridObjective::LapTime],
+        ..laps(folder.path())
+    };
+    Trial::<Hybrid> {
+        prepared: Hybrid::prepare(&settings).unwrap(),
+        settings: &settings,
+        stage: "swarm",
+        front: |outcome| {
+            let found = &outcome.optimised.as_ref().expect("a deployment").swarm;
+            (
+                vec![found.shares.clone()],
+                vec![vec![found.lap.lap.time]],
+                found.evaluations,
+            )
+        },
+    }
+    .loses_nothing();
 }

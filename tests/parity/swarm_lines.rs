@@ -4,9 +4,9 @@ use crate::common::Random;
 use crate::common::line::{circuit, gt_car, lines};
 use crate::device::the_device;
 use glam::DVec2;
-use lapswarm::evaluate::Evaluator;
 use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::line::{GpuLineEvaluator, LineObjective, LineProblem};
+use lapswarm::evaluate::{Evaluation, Evaluator};
 use lapswarm::line::Parametrisation;
 use lapswarm::swarm::checkpoint::{from_bytes, to_bytes};
 use lapswarm::swarm::device::DeviceMopso;
@@ -18,6 +18,7 @@ use std::sync::Arc;
 tests! {
     objectives_are_those_of_the_host: device,
     fronts_are_those_of_the_host: device,
+    a_swarm_of_one_objective_moves_on_the_device_as_in_lanes: device,
 }
 
 /// A few more than a whole number of blocks.
@@ -52,6 +53,53 @@ fn swarm(line: &LineProblem, context: &Arc<GpuContext>) -> DeviceMopso {
     let mut swarm = DeviceMopso::new(&line.problem, settings(), Arc::clone(context)).unwrap();
     swarm.start_from(&start(line)).unwrap();
     swarm
+}
+
+/// The swarm in lanes is told what the device has measured. Where the device rounds as the processor does they stay together bit for
+/// bit; elsewhere until the first move.
+fn a_swarm_of_one_objective_moves_on_the_device_as_in_lanes() {
+    let context = the_device();
+    let line = problem(&[LineObjective::LapTime]);
+    let settings = MopsoSettings {
+        motion: PsoSettings {
+            population: PARTICLES,
+            iterations: GENERATIONS,
+            seed: 4,
+            ..PsoSettings::thesis()
+        },
+        ..MopsoSettings::thesis()
+    };
+    let mut here = Mopso::new(&line.problem, settings.clone()).unwrap();
+    let mut there = DeviceMopso::new(&line.problem, settings, Arc::clone(&context)).unwrap();
+    let mut judge = GpuLineEvaluator::new(&line, Arc::clone(&context)).unwrap();
+    let exact = crate::swarm::rounds_like_the_processor(&context);
+    let mut bests = Vec::new();
+    for generation in 0..GENERATIONS {
+        let candidates = here.ask();
+        if exact || generation == 0 {
+            assert!(candidates == there.candidates().unwrap(), "{generation}");
+        }
+        there.evaluate(&mut judge).unwrap();
+        let measured = there.objectives().unwrap();
+        here.tell(&Evaluation::of_rows(
+            measured.iter().map(|cost| (vec![*cost], None)).collect(),
+        ))
+        .unwrap();
+        bests.push(there.learn_and_move().unwrap().best[0]);
+        if exact {
+            assert_eq!(there.best(), here.best(), "{generation}");
+        }
+    }
+    assert_eq!(there.front().candidates.len(), 1);
+    assert!(
+        bests.is_sorted_by(|a, b| a >= b) && bests[GENERATIONS - 1] < bests[0],
+        "{bests:?}"
+    );
+    let default = MopsoSettings::default().with_size(MANY, 1);
+    let refused = DeviceMopso::new(&line.problem, default, context)
+        .map(drop)
+        .unwrap_err();
+    assert!(refused.to_string().contains("difference_share"), "{refused}");
 }
 
 /// The device scales positions in `f32`: a control point is off by two spacings of a float beside one, 2.4e-7 of 12 m, which

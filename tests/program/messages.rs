@@ -163,7 +163,7 @@ fn a_line_is_driven_on_its_own_circuit() {
     assert!(said(&two).contains("differentcircuits"), "{}", said(&two));
 }
 
-/// A swarm cannot live on a device that does not evaluate it, nor with one objective; a dry run says so too.
+/// A swarm cannot live on a device that does not evaluate it, nor one whose moves the device does not make; a dry run says so too.
 #[test]
 fn a_swarm_on_no_device_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -178,7 +178,7 @@ fn a_swarm_on_no_device_is_refused() {
         ),
         (
             &["--backend", "gpu", "--objectives", "length"],
-            "two or three objectives, for a swarm on the device",
+            "one objective and another algorithm than thesis",
         ),
     ] {
         let refused = asked(more);

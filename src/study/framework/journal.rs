@@ -37,8 +37,15 @@ pub struct Journal {
     settings: Vec<u8>,
     origin: Option<Origin>,
     answers: Vec<Answer>,
-    /// A swarm that lives on a device and has come after these answers: the host does not know what it asks.
-    resident: Option<Box<SwarmState>>,
+    /// Swarms that live on a device, in their order, of which the last may not be done: the host does not know what they ask.
+    residents: Vec<Resident>,
+}
+
+/// A swarm that lives on a device.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Resident {
+    state: SwarmState,
+    backend: BackendInfo,
 }
 
 impl Checkpoint for Journal {
@@ -56,10 +63,16 @@ impl Journal {
             settings: Vec::new(),
             origin: None,
             answers: Vec::new(),
-            resident: None,
+            residents: Vec::new(),
         };
         journal.set_settings(settings)?;
         Ok(journal)
+    }
+
+    /// Keeps the resident swarm of that number.
+    fn keep(&mut self, number: usize, state: SwarmState, backend: BackendInfo) {
+        self.residents.truncate(number);
+        self.residents.push(Resident { state, backend });
     }
 }
 
@@ -82,7 +95,7 @@ impl<S: Serialize + DeserializeOwned> State<S> for Journal {
     }
 
     fn is_untouched(&self) -> bool {
-        self.answers.is_empty() && self.resident.is_none()
+        self.answers.is_empty() && self.residents.is_empty()
     }
 }
 
@@ -91,6 +104,7 @@ pub struct Recorder<'k> {
     /// Nothing where nothing is kept.
     journal: Option<Journal>,
     next: usize,
+    next_resident: usize,
     device_faults: Vec<String>,
     /// What gave the last answer.
     backend: Option<BackendInfo>,
@@ -103,6 +117,7 @@ impl<'k> Recorder<'k> {
         Self {
             journal: journal.into(),
             next: 0,
+            next_resident: 0,
             device_faults: Vec::new(),
             backend: None,
             state_file,
@@ -179,10 +194,13 @@ impl<'k> Recorder<'k> {
         place: (BackendChoice, Option<&str>),
         mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<FrontSwarm> {
-        let begun = self.journal.as_mut().and_then(|journal| journal.resident.take());
+        let number = self.next_resident;
+        self.next_resident += 1;
+        let begun = self.journal.as_ref();
+        let begun = begun.and_then(|journal| journal.residents.get(number).cloned());
         let mut flow = ControlFlow::Continue(());
         let state = match begun {
-            Some(state) => {
+            Some(Resident { state, backend }) => {
                 let failures = state.losses.failures.clone();
                 flow = observe(&Progress {
                     iteration: state.swarm.iteration(),
@@ -193,7 +211,12 @@ impl<'k> Recorder<'k> {
                     failed: 0,
                     failures,
                 });
-                *state
+                if state.swarm.done() {
+                    self.backend = Some(backend);
+                    self.device_faults.extend_from_slice(&state.losses.device_faults);
+                    return Ok(state.swarm);
+                }
+                state
             }
             None => SwarmState {
                 swarm,
@@ -206,16 +229,20 @@ impl<'k> Recorder<'k> {
             if let Some(journal) = &mut self.journal
                 && self.state_file.due()
             {
-                journal.resident = Some(Box::new(at_work.state().clone()));
+                let state = at_work.state().clone();
+                journal.keep(number, state, at_work.backend());
                 self.state_file.save_or_warn(journal);
             }
         }
         let backend = at_work.backend();
-        let state = at_work.finish()?;
-        self.backend = Some(backend);
+        let mut state = at_work.finish()?;
+        if state.swarm.done() {
+            state.swarm.let_particles_go();
+        }
+        self.backend = Some(backend.clone());
         self.device_faults.extend_from_slice(&state.losses.device_faults);
         if let Some(journal) = &mut self.journal {
-            journal.resident = Some(Box::new(state.clone()));
+            journal.keep(number, state.clone(), backend);
         }
         Ok(state.swarm)
     }

@@ -15,7 +15,7 @@ use crate::line::energy::{Gates, Mode};
 use crate::study::framework::memory::Size;
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::study::raceline::RacelineSettings;
-use crate::swarm::{FrontSearch, MopsoSettings, Mutation, Schedule, SwarmPlace};
+use crate::swarm::{FrontSearch, MopsoSettings, Mutation, PsoSettings, Schedule, SwarmPlace};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -166,7 +166,7 @@ settings! {
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
-            "Where the particles of the front live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
+            "Where particles live, of the front or with algorithm thesis; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where laps are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -232,6 +232,16 @@ impl HybridStudySettings {
             .with_seed(self.seed)
     }
 
+    /// The swarm that looks for the best strategy by one objective with algorithm thesis.
+    pub(super) fn strategy_swarm(&self) -> PsoSettings {
+        self.coefficients().apply(PsoSettings {
+            population: self.population,
+            iterations: self.iterations,
+            seed: self.seed,
+            ..PsoSettings::thesis()
+        })
+    }
+
     /// Checks that the front's swarm can live where it is asked to.
     ///
     /// # Errors
@@ -239,7 +249,12 @@ impl HybridStudySettings {
     pub(super) fn check_place(&self) -> Result<()> {
         let backend = (self.backend, self.adapter.as_deref());
         let objectives = self.objectives.len();
-        let swarm = self.front_swarm();
+        let swarm = match objectives {
+            1 if self.algorithm == HybridAlgorithm::Thesis => {
+                MopsoSettings::of_one_objective(self.strategy_swarm())
+            }
+            _ => self.front_swarm(),
+        };
         self.front_search()
             .wants_device(self.swarm, objectives, &swarm, backend)
             .map(drop)

@@ -15,7 +15,10 @@ use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
 use crate::study::framework::journal::Recorder;
-use crate::swarm::{HybridSettings, HybridSwarm, Optimiser, Progress, Pso, PsoSettings, Reached, run};
+use crate::swarm::{
+    FrontSearch, HybridSettings, HybridSwarm, MopsoSettings, Optimiser, Progress, Pso, Reached, SwarmPlace,
+    run,
+};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -163,14 +166,18 @@ pub(super) fn search(
     recorder: &mut Recorder<'_>,
     mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<FoundStrategy> {
-    let mut swarm: Box<dyn Optimiser> = if settings.algorithm == HybridAlgorithm::Thesis {
-        let motion = PsoSettings {
-            population: settings.population,
-            iterations: settings.iterations,
-            seed: settings.seed,
-            ..PsoSettings::thesis()
-        };
-        Box::new(Pso::new(&problem.problem, settings.coefficients().apply(motion))?)
+    let place = (settings.backend, settings.adapter.as_deref());
+    let published = settings.algorithm == HybridAlgorithm::Thesis;
+    let pulls = MopsoSettings::of_one_objective(settings.strategy_swarm());
+    let alone = FrontSearch::ONE_SWARM;
+    if published && alone.on_device(settings.swarm, &problem.problem, &pulls, place)? {
+        let swarm = alone.begin(&problem.problem, pulls, SwarmPlace::Device)?;
+        let swarm = recorder.run_on_device(problem, swarm, place, observe)?;
+        let reached = swarm.reached().to_vec();
+        return Ok(FoundStrategy::of((name, problem), &swarm, reached));
+    }
+    let mut swarm: Box<dyn Optimiser> = if published {
+        Box::new(Pso::new(&problem.problem, settings.strategy_swarm())?)
     } else {
         let best = HybridSettings {
             population: settings.population,
@@ -184,7 +191,7 @@ pub(super) fn search(
             None => Box::new(swarm),
         }
     };
-    let mut evaluator = open_hybrid_evaluator(problem, settings.backend, settings.adapter.as_deref())?;
+    let mut evaluator = open_hybrid_evaluator(problem, place.0, place.1)?;
     let (began, mut reached) = (Instant::now(), Vec::new());
     run(&mut swarm, &mut recorder.over(evaluator.as_mut()), |progress| {
         let best = progress.best.first().copied().unwrap_or(f64::NAN);
@@ -192,16 +199,23 @@ pub(super) fn search(
         reached.push(Reached::best(progress.evaluations, elapsed_s, best));
         observe(progress)
     })?;
-    // A lap that cannot be driven is no answer: the shares are then none.
-    let best = swarm.front().candidates.into_iter().next();
-    let shares = best.unwrap_or_else(|| vec![0.0; problem.dimensions()]);
-    Ok(FoundStrategy {
-        lap: ReportedLap::of(name, problem, &shares),
-        names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),
-        shares,
-        evaluations: swarm.evaluations(),
-        reached,
-    })
+    Ok(FoundStrategy::of((name, problem), &swarm, reached))
+}
+
+impl FoundStrategy {
+    /// What a swarm has come to.
+    fn of((name, problem): (&str, &HybridProblem), swarm: &impl Optimiser, reached: Vec<Reached>) -> Self {
+        // A lap that cannot be driven is no answer: the shares are then none.
+        let best = swarm.front().candidates.into_iter().next();
+        let shares = best.unwrap_or_else(|| vec![0.0; problem.dimensions()]);
+        Self {
+            lap: ReportedLap::of(name, problem, &shares),
+            names: problem.problem.variables.iter().map(|v| v.name.clone()).collect(),
+            shares,
+            evaluations: swarm.evaluations(),
+            reached,
+        }
+    }
 }
 
 /// Laps none of which another betters in every objective.

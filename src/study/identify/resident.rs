@@ -1,4 +1,4 @@
-//! The swarm for several objectives where it lives on the device that drives its cars.
+//! The first swarm where it lives on the device that drives its cars.
 
 use super::search::on_device;
 use super::settings::IdentifySettings;

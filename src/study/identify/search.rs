@@ -14,6 +14,7 @@ use crate::study::framework::{Progress as Told, RunRecord, State, Watch};
 use crate::swarm::metrics::nearest_to_ideal;
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, FrontSwarm, MopsoSettings, Optimiser, Progress, Pso, PsoSettings,
+    SwarmPlace,
 };
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -276,12 +277,19 @@ fn first_place(settings: &IdentifySettings, setup: &Setup) -> Result<Place> {
     Ok(if settings.objectives.len() > 1 {
         let swarm = front_settings(settings, motion);
         Place::Front(settings.front_search().begin(problem, swarm, settings.place)?)
+    } else if on_device(settings, setup)? {
+        let swarm = front_settings(settings, motion);
+        Place::Front(
+            settings
+                .front_search()
+                .begin(problem, swarm, SwarmPlace::Device)?,
+        )
     } else {
         Place::Explore(Box::new(Pso::new(problem, motion)?))
     })
 }
 
-/// Whether the swarm for several objectives lives on the device.
+/// Whether the first swarm lives on the device.
 ///
 /// # Errors
 /// [`Error::Input`] with the reason if it is asked to and cannot.
@@ -351,7 +359,9 @@ fn best_so_far(place: &Place, evaluator: &mut dyn Evaluator) -> Result<(Vec<f64>
         Place::Searched { best, front } => return Ok((best.clone(), front.clone())),
         Place::Front(swarm) => {
             let front = front_of(swarm).ok_or_else(nothing_drives)?;
-            return Ok((front.candidates[front.chosen].clone(), Some(front)));
+            let best = front.candidates[front.chosen].clone();
+            let several = front.objectives[front.chosen].len() > 1;
+            return Ok((best, several.then_some(front)));
         }
         Place::Explore(swarm) => swarm.best_candidate(),
         Place::Gather { best, worth, swarm } => {
@@ -456,6 +466,9 @@ fn swarm_settings(settings: &IdentifySettings) -> PsoSettings {
 
 /// The thesis's swarm, or the best there is; pulls that the study names make it a plain one with these.
 fn front_settings(settings: &IdentifySettings, motion: PsoSettings) -> MopsoSettings {
+    if settings.objectives.len() == 1 {
+        return MopsoSettings::of_one_objective(motion);
+    }
     let named = settings.coefficients();
     let base = match settings.algorithm {
         Algorithm::Thesis => MopsoSettings::thesis(),

@@ -45,7 +45,7 @@ pub struct Front {
 pub(super) enum Place {
     /// The exploring swarm.
     Explore(Box<Pso>),
-    /// The swarm that looks for a front.
+    /// The swarm that looks for a front, or for one objective on a device.
     Front(FrontSwarm),
     /// The swarm that learns the valley, and the best before it.
     Gather {

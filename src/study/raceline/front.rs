@@ -122,23 +122,27 @@ pub(super) fn search_front(
                 .collect()
         }));
     }
+    // Lines that leave the road between cross-sections are no worse than what they are moved in to: those that are dominated on the
+    // road need not be moved in.
     let mut archive = Archive::new(settings.archive, Truncation::Contribution);
-    let lines = on_road(setup, settings, &lines)?;
+    let mut sought = archive.clone();
     let mut evaluations = swarm.evaluations();
-    evaluations += insert_all(&mut archive, judge.as_mut(), &lines)?;
+    evaluations += insert_all([&mut sought], judge.as_mut(), &lines)?;
     if settings.searches_locally() && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         // Lines between others start from what these came to.
         let weights = lattice(settings.objectives.len(), LATTICE);
         for wave in 0..WAVES {
-            let starts = starts_along(&archive, weights.iter().skip(wave).step_by(WAVES), settings);
+            let starts = starts_along(&sought, weights.iter().skip(wave).step_by(WAVES), settings);
             let polished = std::thread::scope(|scope| {
                 let led = scope.spawn(|| solvers.polish(starts, &POLISH));
                 interruptible(led, solvers.flag(), || observe(&latest, &mut || state.clone()))
             })?;
             let polished = on_road(setup, settings, &polished)?;
-            evaluations += insert_all(&mut archive, judge.as_mut(), &polished)?;
+            evaluations += insert_all([&mut sought, &mut archive], judge.as_mut(), &polished)?;
         }
     }
+    let left = on_road(setup, settings, &[known, &sought.positions[..]].concat())?;
+    evaluations += insert_all([&mut archive], judge.as_mut(), &left)?;
 
     // The point that the reference line and the edges of the archive do not exceed.
     let middle = judge.evaluate(&cross_sections.reference)?.objectives;
@@ -237,13 +241,19 @@ fn on_road(setup: &Setup, settings: &RacelineSettings, lines: &[Vec<f64>]) -> Re
     Ok(kept.into_iter().flatten().collect())
 }
 
-/// Scores lines and offers them to the archive; returns how many.
-fn insert_all(archive: &mut Archive, judge: &mut dyn Evaluator, lines: &[Vec<f64>]) -> Result<u64> {
+/// Scores lines and offers them to archives; returns how many.
+fn insert_all<const N: usize>(
+    mut archives: [&mut Archive; N],
+    judge: &mut dyn Evaluator,
+    lines: &[Vec<f64>],
+) -> Result<u64> {
     let width = judge.problem().objectives.len();
     let found = judge.evaluate(&lines.concat())?;
     for (i, line) in lines.iter().enumerate() {
         if let Some(row) = found.success(i, width) {
-            archive.insert(line, row);
+            archives
+                .iter_mut()
+                .for_each(|archive| _ = archive.insert(line, row));
         }
     }
     Ok(lines.len() as u64)

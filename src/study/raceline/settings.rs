@@ -12,7 +12,9 @@ use crate::line::{CarPlan, TERMS};
 use crate::study::framework::memory::Size;
 use crate::study::framework::setups::{MOST_SETUPS, check_parameters};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
-use crate::swarm::{FrontSearch, MopsoSettings, Mutation, Schedule, SwarmPlace};
+use crate::swarm::{
+    CooperativeSettings, FrontSearch, MopsoSettings, Mutation, PsoSettings, Schedule, SwarmPlace,
+};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -101,7 +103,7 @@ settings! {
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
-            "Where the particles of the front live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
+            "Where particles live, of the front or with algorithm thesis; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where lines are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -251,12 +253,34 @@ impl RacelineSettings {
             .with_seed(self.seed)
     }
 
-    /// Whether it lives on the device.
+    /// The swarm that looks for the best line by one objective with algorithms cooperative and thesis.
+    pub(super) fn line_swarm(&self) -> PsoSettings {
+        let motion = match self.algorithm {
+            LineAlgorithm::Cooperative => CooperativeSettings::default().motion,
+            _ => PsoSettings::thesis_lines(),
+        };
+        self.coefficients().apply(PsoSettings {
+            population: self.population,
+            iterations: self.iterations,
+            seed: self.seed,
+            ..motion
+        })
+    }
+
+    /// Whether the swarm for the objectives of `problem` lives on the device.
     ///
     /// # Errors
     /// [`Error::Input`] with the reason if it is asked to and cannot.
     pub(super) fn on_device(&self, problem: &Problem) -> Result<bool> {
         let backend = (self.backend, self.adapter.as_deref());
+        if problem.objectives.len() == 1 {
+            let motion = match self.algorithm {
+                LineAlgorithm::Thesis => self.line_swarm(),
+                _ => PsoSettings::default(),
+            };
+            let pulls = MopsoSettings::of_one_objective(motion);
+            return FrontSearch::ONE_SWARM.on_device(self.swarm, problem, &pulls, backend);
+        }
         self.front_search()
             .on_device(self.swarm, problem, &self.front_swarm(), backend)
     }

@@ -9,7 +9,10 @@ use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem, open_l
 use crate::evaluate::{BackendInfo, DeviceFaults, Evaluator, Losses};
 use crate::line::Parametrisation;
 use crate::study::framework::Progress;
-use crate::swarm::{CooperativeSettings, CooperativeSwarm, Optimiser, Pso, PsoSettings, step};
+use crate::swarm::{
+    CooperativeSettings, CooperativeSwarm, FrontSearch, FrontSwarm, MopsoSettings, Optimiser, Pso,
+    PsoSettings, SwarmAtWork, SwarmPlace, SwarmState, step,
+};
 use crate::track::CrossSections;
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +21,14 @@ use serde::{Deserialize, Serialize};
 pub(super) enum WholeLineSwarm {
     Cooperative(Box<CooperativeSwarm>),
     Thesis(Box<Pso>),
+    /// The same on a device.
+    Resident(Box<FrontSwarm>),
+}
+
+/// What evaluates a swarm.
+enum AtWork<'a> {
+    Host(Box<dyn Evaluator + 'a>, DeviceFaults),
+    Device(SwarmAtWork<'a>),
 }
 
 /// Where such a search is: all that it takes to resume it.
@@ -34,23 +45,22 @@ pub(super) struct WholeLineState {
 
 impl WholeLineState {
     fn new(settings: &RacelineSettings, problem: &LineProblem) -> Result<Self> {
-        let sized = |motion: PsoSettings, turns: usize| {
-            settings.coefficients().apply(PsoSettings {
-                population: settings.population,
-                iterations: settings.iterations.saturating_mul(turns),
-                seed: settings.seed,
-                ..motion
-            })
-        };
+        let (motion, problem) = (settings.line_swarm(), &problem.problem);
         let swarm = if settings.algorithm == LineAlgorithm::Cooperative {
             // The groups take turns, and each has the iterations that are asked for.
-            let groups = settings.groups.min(problem.dimensions());
-            let motion = sized(CooperativeSettings::default().motion, groups);
+            let groups = settings.groups.min(problem.variables.len());
+            let motion = PsoSettings {
+                iterations: settings.iterations.saturating_mul(groups),
+                ..motion
+            };
             let settings = CooperativeSettings { motion, groups };
-            WholeLineSwarm::Cooperative(Box::new(CooperativeSwarm::new(&problem.problem, settings)?))
+            WholeLineSwarm::Cooperative(Box::new(CooperativeSwarm::new(problem, settings)?))
+        } else if settings.on_device(problem)? {
+            let pulls = MopsoSettings::of_one_objective(motion);
+            let swarm = FrontSearch::ONE_SWARM.begin(problem, pulls, SwarmPlace::Device)?;
+            WholeLineSwarm::Resident(Box::new(swarm))
         } else {
-            let motion = sized(PsoSettings::thesis_lines(), 1);
-            WholeLineSwarm::Thesis(Box::new(Pso::new(&problem.problem, motion)?))
+            WholeLineSwarm::Thesis(Box::new(Pso::new(problem, motion)?))
         };
         Ok(Self {
             swarm,
@@ -67,6 +77,7 @@ impl WholeLineSwarm {
         match self {
             Self::Cooperative(swarm) => swarm.as_mut(),
             Self::Thesis(swarm) => swarm.as_mut(),
+            Self::Resident(swarm) => swarm.as_mut(),
         }
     }
 }
@@ -156,12 +167,34 @@ impl WholeLineState {
         objective: LineObjective,
         work: &mut Running<'_>,
     ) -> Result<(bool, BackendInfo)> {
-        let mut evaluator = open_line_evaluator(problem, settings.backend, settings.adapter.as_deref())?;
-        let mut faults = DeviceFaults::beyond(&work.state.device_faults(), evaluator.as_ref());
-        while !self.swarm.swarm().done() {
-            let progress = step(self.swarm.swarm(), evaluator.as_mut())?;
-            self.losses
-                .note(&progress.failures, &mut faults, evaluator.as_ref());
+        let place = (settings.backend, settings.adapter.as_deref());
+        let known = work.state.device_faults();
+        let mut at_work = match &self.swarm {
+            WholeLineSwarm::Resident(swarm) => {
+                let begun = SwarmState {
+                    swarm: (**swarm).clone(),
+                    losses: self.losses.clone(),
+                };
+                AtWork::Device(SwarmAtWork::open(problem, begun, true, place, &known)?)
+            }
+            _ => {
+                let evaluator = open_line_evaluator(problem, place.0, place.1)?;
+                let faults = DeviceFaults::beyond(&known, evaluator.as_ref());
+                AtWork::Host(evaluator, faults)
+            }
+        };
+        let mut interrupted = false;
+        while !interrupted {
+            let progress = match &mut at_work {
+                AtWork::Device(swarm) if swarm.done() => break,
+                AtWork::Device(swarm) => swarm.step()?,
+                AtWork::Host(..) if self.swarm.swarm().done() => break,
+                AtWork::Host(evaluator, faults) => {
+                    let progress = step(self.swarm.swarm(), evaluator.as_mut())?;
+                    self.losses.note(&progress.failures, faults, evaluator.as_ref());
+                    progress
+                }
+            };
             let evaluations = self.spent + progress.evaluations;
             // What sectors cost by themselves makes no curve.
             if settings.sectors == 1 {
@@ -176,11 +209,30 @@ impl WholeLineState {
             let best = format!("best {:.4} {}", progress.best[0], objective.unit());
             let told = Progress::reached(objective.line_name(), evaluations, best);
             let kept = &*self;
-            let update = |state: &mut LinesState| state.whole_lines = Some(Box::new(kept.clone()));
-            if work.told(&told, update)?.is_break() {
-                return Ok((true, evaluator.backend()));
-            }
+            let update = |state: &mut LinesState| {
+                let mut kept = kept.clone();
+                if let AtWork::Device(swarm) = &mut at_work {
+                    kept.take_back(swarm.state());
+                }
+                state.whole_lines = Some(Box::new(kept));
+            };
+            interrupted = work.told(&told, update)?.is_break();
         }
-        Ok((false, evaluator.backend()))
+        let backend = match at_work {
+            AtWork::Device(swarm) => {
+                let backend = swarm.backend();
+                self.take_back(&swarm.finish()?);
+                backend
+            }
+            AtWork::Host(evaluator, _) => evaluator.backend(),
+        };
+        Ok((interrupted, backend))
+    }
+
+    /// Takes a swarm as it was on its device, with what is noted of its iterations.
+    fn take_back(&mut self, now: &SwarmState) {
+        self.history.truncate(now.swarm.iteration());
+        self.losses = now.losses.clone();
+        self.swarm = WholeLineSwarm::Resident(Box::new(now.swarm.clone()));
     }
 }

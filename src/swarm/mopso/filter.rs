@@ -3,7 +3,7 @@
 //! A swarm is filtered, never ranked. Points that a member of the archive dominates or equals go first, then those that
 //! a few good points of their part of the swarm dominate; what is left of each part, and then of all parts together, is
 //! swept exactly (Kung, Luccio, Preparata, *On finding the maxima of a set of vectors*, J. ACM 22, 1975): sorting and a
-//! running minimum for two objectives, a staircase for three. The parts have a fixed size, so that the outcome does
+//! running minimum for one and two objectives, a staircase for three. The parts have a fixed size, so that the outcome does
 //! not depend on the threads.
 
 use crate::evaluate::resident::BLOCK;
@@ -85,7 +85,7 @@ pub fn front(mut points: Vec<Point>, width: usize) -> Vec<Point> {
             points.retain(|p| !beats(&pivot, &p.at));
         }
     }
-    let kept = if width == 2 {
+    let kept = if width <= 2 {
         let key = |p: &Point| (p.at[0], p.at[1]);
         points.par_sort_unstable_by(|a, b| order(&key(a), &key(b)).then(a.who.cmp(&b.who)));
         let mut least = f64::INFINITY;

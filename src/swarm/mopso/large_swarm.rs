@@ -30,6 +30,28 @@ const GREATEST: f32 = UNKNOWN.next_down();
 /// Particles that are filtered together and that one thread handles in a row.
 const PART: usize = 64 * BLOCK;
 
+/// The empty archive of a swarm in single precision over the variables of `problem`.
+///
+/// # Errors
+/// [`crate::Error::Input`] naming the setting that is out of its range or that only small swarms obey.
+pub fn empty_archive(problem: &Problem, settings: &MopsoSettings) -> Result<Archive> {
+    let objectives = problem.objectives.len();
+    let archive = settings.empty_archive(objectives)?;
+    let motion = &settings.motion;
+    if motion.mutation.tries() {
+        let found = format!("{:?}", motion.mutation);
+        let expected = "none or polynomial, for a swarm in single precision or on a device";
+        return Err(setting("mutation", found, expected));
+    }
+    // A best of one member has no differences.
+    if objectives == 1 && motion.difference_share > 0.0 {
+        let found = format!("{}, with one objective", motion.difference_share);
+        let expected = "0, for a swarm in single precision or on a device";
+        return Err(setting("difference_share", found, expected));
+    }
+    Ok(archive)
+}
+
 /// State of a large swarm. Rows of a block follow one another; its last block may have lanes without a particle.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct LargeSwarm {
@@ -176,12 +198,7 @@ impl LargeSwarm {
     /// # Errors
     /// [`crate::Error::Input`] naming the setting that is out of its range.
     pub fn new(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
-        settings.validate()?;
-        if settings.motion.mutation.tries() {
-            let found = format!("{:?}", settings.motion.mutation);
-            let expected = "none or polynomial, for a swarm in single precision or on a device";
-            return Err(setting("mutation", found, expected));
-        }
+        let archive = empty_archive(problem, &settings)?;
         let space = Space::new(problem)?;
         let (d, width) = (space.dimensions(), problem.objectives.len());
         let lanes = settings.motion.population.next_multiple_of(BLOCK);
@@ -206,7 +223,7 @@ impl LargeSwarm {
             best_position: position.clone(),
             best_objectives: vec![UNKNOWN; lanes * width],
             best_violation: Vec::new(),
-            archive: settings.empty_archive(problem.objectives.len())?,
+            archive,
             objectives: width,
             position,
             random,
@@ -265,6 +282,15 @@ impl LargeSwarm {
             earnings: state.earnings,
             counters: state.counters,
         }
+    }
+
+    /// Lets go of the particles.
+    #[cfg(feature = "studies")]
+    pub fn let_particles_go(&mut self) {
+        self.position = Vec::new();
+        self.velocity = Vec::new();
+        self.best_position = Vec::new();
+        self.best_objectives = Vec::new();
     }
 
     pub fn archive(&self) -> &Archive {

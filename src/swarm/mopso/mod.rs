@@ -20,8 +20,8 @@ use large_swarm::LargeSwarm;
 use serde::{Deserialize, Serialize};
 use small_swarm::SmallSwarm;
 
-/// From this many particles on, a swarm of two or three objectives is kept in single precision and moved in lanes and
-/// threads.
+/// From this many particles on, a swarm of two or three objectives, or of one and pulls alone, is kept in single precision and moved
+/// in lanes and threads.
 pub const MANY: usize = 4096;
 
 /// A swarm that follows an archive of non-dominated solutions (references 4 and 5 of [`super`]).
@@ -48,9 +48,14 @@ impl Mopso {
     /// # Errors
     /// [`crate::Error::Input`] naming the setting that is out of its range.
     pub fn new(problem: &Problem, settings: MopsoSettings) -> Result<Self> {
-        let many = settings.motion.population >= MANY
-            && !settings.motion.mutation.tries()
-            && (2..=3).contains(&problem.objectives.len())
+        let motion = &settings.motion;
+        let fits = match problem.objectives.len() {
+            1 => motion.difference_share <= 0.0,
+            objectives => (2..=3).contains(&objectives),
+        };
+        let many = fits
+            && motion.population >= MANY
+            && !motion.mutation.tries()
             && problem.variables.iter().any(|v| v.upper > v.lower);
         Ok(Self {
             kind: if many {
@@ -84,6 +89,14 @@ impl Mopso {
     pub(super) fn from_device(state: DeviceState) -> Self {
         let kind = Kind::Large(LargeSwarm::from_device(state));
         Self { kind }
+    }
+
+    /// Lets go of the particles of a large swarm that is done.
+    #[cfg(feature = "studies")]
+    pub(super) fn let_particles_go(&mut self) {
+        if let Kind::Large(swarm) = &mut self.kind {
+            swarm.let_particles_go();
+        }
     }
 
     /// Puts the first particles at these candidates (in the variables' units), before the first population is asked for.
