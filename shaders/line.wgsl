@@ -3,7 +3,7 @@
 // One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section by
 // section within a tile, so that neighbouring lanes and neighbouring sections read neighbouring memory. All lanes start a lap's
 // passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, ENVELOPE_ROWS,
-// CORNER_ROWS, ELLIPSE_ROWS, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, HAS_RELIEF, LOADS, LOADS_AT, LOAD_STEP,
+// CORNER_ROWS, ELLIPSE_ROWS, HAS_STEERING_RATE, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, HAS_RELIEF, LOADS, LOADS_AT, LOAD_STEP,
 // WORKGROUP and TILE are generated, and
 // so are the bindings 1 to 4: `sections`; `envelope` in rows of lateral, grip, drive, drag at their start and then of their rises,
 // behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open. On a road that is not level and dry
@@ -35,7 +35,8 @@ struct LineStretch {
     lock_radius: f32,
     gravity: f32,
     coasting: f32,
-    spare: u32,
+    // Square of the greatest rate at which the curvature may change in time.
+    curvature_rate_squared: f32,
 }
 
 struct Section {
@@ -399,6 +400,17 @@ fn corner(ground: Ground) -> f32 {
     return figures.x + (held - f32(row)) * figures.y;
 }
 
+// The corner speed squared at the end of a segment of a length, no greater than the steering follows the change of curvature at.
+fn steered_corner(length: f32, before: Ground, ground: Ground) -> f32 {
+    let most = corner(ground);
+    if !HAS_STEERING_RATE {
+        return most;
+    }
+    let change = abs(ground.bend) - abs(before.bend);
+    let change_squared = max(change * change, 1e-14);
+    return min(most, stretch.curvature_rate_squared * (length * length) / change_squared);
+}
+
 // Lateral, grip, drive and drag. `table` is where the limits begin: 0, or OPEN_AT with the DRS open.
 fn limits_at(speed_squared: f32, ground: Ground, table: u32) -> vec4<f32> {
     let held = min(max(speed_squared * stretch.rows_per_speed_squared, 0.0), f32(ENVELOPE_ROWS));
@@ -527,9 +539,12 @@ fn lap_time(candidate: u32) -> f32 {
 
     var here = start;
     var spot = spot_at(start, candidate);
-    var speed_squared = corner(spot.ground);
-    if !CLOSED {
-        speed_squared = min(speed_squared, stretch.entry);
+    var speed_squared = 0.0;
+    if CLOSED {
+        let before = spot_at(select(n - 1u, start - 1u, start > 0u), candidate);
+        speed_squared = steered_corner(before.length, before.ground, spot.ground);
+    } else {
+        speed_squared = min(corner(spot.ground), stretch.entry);
     }
     speeds_squared[place_of(start, candidate)] = speed_squared;
     for (var i = 0u; i < steps; i++) {
@@ -542,7 +557,7 @@ fn lap_time(candidate: u32) -> f32 {
         if again {
             most = speeds_squared[place_of(next, candidate)];
         } else {
-            most = corner(there.ground);
+            most = steered_corner(spot.length, spot.ground, there.ground);
         }
         let slower = reached < most;
         if again && !slower {

@@ -217,6 +217,7 @@ class LineFigures:
     integral_kappa2_fine_1pm: float
     clearance_m: float
     clearance_station_m: float
+    steering_rate_deg_s: float
 
 
 @dataclass(frozen=True)

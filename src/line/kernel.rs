@@ -231,6 +231,25 @@ pub fn corner<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, ground: impl Grou
     ground.corner(envelope)
 }
 
+/// The corner speed squared (m^2/s^2) at the end of a segment of a length (m), no greater than the steering follows the change of
+/// curvature at. Where the bend changes sides, each of its sides is followed by itself.
+#[inline(always)]
+fn steered_corner<R: Lookup, G: Ground<R>>(
+    envelope: &EnvelopeTable<R::Storage>,
+    length: R,
+    before: G,
+    ground: G,
+) -> R {
+    let most = corner(envelope, ground);
+    let Some(rate_squared) = envelope.curvature_rate_squared else {
+        return most;
+    };
+    let change = ground.bend() - before.bend();
+    // Over a straight there is none; one of a hundred-thousandth of a curve of 100 m stands for it.
+    let change_squared = (change * change).max(R::lit(1e-14));
+    most.min(R::load(rate_squared) * (length * length) / change_squared)
+}
+
 /// The share of the longitudinal grip that is left for braking.
 #[inline(always)]
 fn left_for_braking<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, root: R) -> R {
@@ -406,7 +425,13 @@ fn lap_on<R: Lookup, G: Grounds<R>>(
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
     let start = if closed { start } else { 0 };
-    speeds[start] = corner(envelope.at(start), G::at(course, start, start));
+    speeds[start] = if closed {
+        let before = if start > 0 { start - 1 } else { n - 1 };
+        let [from, to] = [before, start].map(|section| G::at(course, section, section));
+        steered_corner(envelope.at(start), length[before], from, to)
+    } else {
+        corner(envelope.at(start), G::at(course, start, start))
+    };
     if !closed {
         speeds[0] = speeds[0].min(entry);
     }
@@ -428,7 +453,8 @@ fn lap_on<R: Lookup, G: Grounds<R>>(
         let most = if again {
             speeds[next]
         } else {
-            corner(envelope.at(next), G::at(course, next, next))
+            let [from, to] = [here, next].map(|section| G::at(course, section, section));
+            steered_corner(envelope.at(next), length[here], from, to)
         };
         let slower = reached.less_than(most);
         speeds[next] = R::select(slower, reached, most);

@@ -4,7 +4,7 @@ use super::plan::{LinePlan, TERMS};
 use crate::error::{Error, Result};
 use crate::evaluate::Variable;
 use crate::track::CrossSections;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// The meaning of a line's coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -268,8 +268,18 @@ impl Parametrisation {
     /// # Errors
     /// As [`Parametrisation::check`]; [`Error::Input`] if `alpha` does not have one value per section.
     pub fn fit(&self, cross_sections: &CrossSections, alpha: &[f64]) -> Result<Vec<f64>> {
+        Ok(self.fit_all(cross_sections, &[alpha])?.swap_remove(0))
+    }
+
+    /// As [`Parametrisation::fit`], for several lines.
+    ///
+    /// # Errors
+    /// As [`Parametrisation::fit`].
+    pub fn fit_all(&self, cross_sections: &CrossSections, lines: &[&[f64]]) -> Result<Vec<Vec<f64>>> {
         self.check(cross_sections)?;
-        if alpha.len() != cross_sections.len() || alpha.iter().any(|a| !a.is_finite()) {
+        let sound =
+            |alpha: &&&[f64]| alpha.len() == cross_sections.len() && alpha.iter().all(|a| a.is_finite());
+        if let Some(alpha) = lines.iter().find(|alpha| !sound(alpha)) {
             return Err(Error::input(
                 &cross_sections.name,
                 "line, alpha",
@@ -278,18 +288,21 @@ impl Parametrisation {
             ));
         }
         let Basis::ControlPoints { count, .. } = self.basis else {
-            return Ok(alpha.iter().map(|a| a.clamp(0.0, 1.0)).collect());
+            let held = |alpha: &&[f64]| alpha.iter().map(|a| a.clamp(0.0, 1.0)).collect();
+            return Ok(lines.iter().map(held).collect());
         };
         let scales = self.scales(cross_sections);
         // Normal equations plus a very small multiple of the identity, so that control points without a section stay in the
         // middle.
         let mut matrix = DMatrix::<f64>::identity(count, count) * 1e-9;
-        let mut right = DVector::from_element(count, 0.5e-9);
-        for (section, alpha) in alpha.iter().enumerate() {
+        let mut right = DMatrix::from_element(count, lines.len(), 0.5e-9);
+        for section in 0..cross_sections.len() {
             let weights = self.weights_at(cross_sections, section);
-            let sum = (alpha - self.origin(cross_sections, section, scales[section])) / scales[section];
+            let origin = self.origin(cross_sections, section, scales[section]);
             for (i, weight) in weights {
-                right[i] += weight * sum;
+                for (line, alpha) in lines.iter().enumerate() {
+                    right[(i, line)] += weight * ((alpha[section] - origin) / scales[section]);
+                }
                 for (j, other) in weights {
                     matrix[(i, j)] += weight * other;
                 }
@@ -304,8 +317,12 @@ impl Parametrisation {
             )
         })?;
         let bounds = self.bounds(cross_sections);
-        let held = solution.iter().zip(bounds);
-        Ok(held.map(|(c, (lower, upper))| c.clamp(lower, upper)).collect())
+        let held = |line: usize| {
+            let held = solution.column(line);
+            let held = held.iter().zip(&bounds);
+            held.map(|(c, (lower, upper))| c.clamp(*lower, *upper)).collect()
+        };
+        Ok((0..lines.len()).map(held).collect())
     }
 
     /// The variables among the coefficients that [`Parametrisation::fit`] gives.

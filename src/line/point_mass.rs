@@ -20,6 +20,9 @@ pub struct PointMass {
     /// A bend tighter than the lock allows cannot be driven. The line does not fail: the corner speed squared falls with the
     /// fourth power of the radius, so that a search is led back to lines that can be driven.
     pub max_steer_rad: Option<f64>,
+    /// Greatest steering rate at the wheels (rad/s), if it is limited: the speed falls where the curvature would change faster than
+    /// this over the wheelbase.
+    pub max_steer_rate_radps: Option<f64>,
     /// Mass that the engine accelerates over that of the car; what rotates is not lifted on a climb.
     pub rotating_mass_factor: f64,
     /// Whether its tables have limits under loads, for laps on roads in three dimensions.
@@ -54,6 +57,8 @@ pub struct EnvelopeTable<S> {
     pub open: Option<Box<Self>>,
     /// Limits under loads; empty for level roads.
     pub loads: LoadTables<S>,
+    /// Square of the greatest rate at which the curvature may change in time (1/(m^2 s^2)), if that is limited.
+    pub curvature_rate_squared: Option<S>,
 }
 
 /// Cells of [`EnvelopeTable::traction`] over the speed squared. The share changes with downforce alone.
@@ -80,6 +85,7 @@ impl PointMass {
             ellipse_exponent: 2.0,
             wheelbase_m,
             max_steer_rad: None,
+            max_steer_rate_radps: None,
             rotating_mass_factor: 1.0,
             relief: false,
         }
@@ -102,8 +108,15 @@ impl PointMass {
         within("ellipse_exponent", self.ellipse_exponent, 1.0, 4.0)?;
         within("wheelbase_m", self.wheelbase_m, 0.1, 20.0)?;
         within("rotating_mass_factor", self.rotating_mass_factor, 1.0, 3.0)?;
+        self.max_steer_rate_radps
+            .map_or(Ok(()), |x| within("max_steer_rate_radps", x, 1e-3, 1e3))?;
         self.max_steer_rad
             .map_or(Ok(()), |x| within("max_steer_rad", x, 0.01, 1.5))
+    }
+
+    /// Greatest rate at which the path's curvature may change in time (1/(m s)), if that is limited.
+    pub fn curvature_rate(&self) -> Option<f64> {
+        self.max_steer_rate_radps.map(|rate| rate / self.wheelbase_m)
     }
 
     /// The share of the tyres' grip that accelerations along and across the car (m/s^2) take at a speed (m/s): 1 on the ellipse. Drag is
@@ -163,6 +176,7 @@ impl PointMass {
                 None => None,
             },
             loads: LoadTables::default(),
+            curvature_rate_squared: self.curvature_rate().map(|rate| rate * rate),
         })
     }
 
@@ -280,6 +294,7 @@ impl EnvelopeTable<f64> {
             traction: all(&self.traction),
             open: self.open.as_ref().map(|open| Box::new(open.stored::<R>())),
             loads: self.loads.stored::<R>(),
+            curvature_rate_squared: self.curvature_rate_squared.map(R::store),
         }
     }
 }

@@ -84,6 +84,23 @@ impl LapProfile {
         }
     }
 
+    /// The fastest turn of the front wheels (rad/s): the change of the steering angle along a segment, without regard to its sign, at
+    /// the speed at its end.
+    pub fn steering_rate_radps(&self) -> f64 {
+        let n = self.steering_rad.len();
+        let rate = |(i, time): (usize, &f64)| {
+            let next = (i + 1) % n;
+            let length = 0.5 * time * (self.v_mps[i] + self.v_mps[next]);
+            let change = self.steering_rad[next].abs() - self.steering_rad[i].abs();
+            change.abs() * self.v_mps[next] / length
+        };
+        self.segment_time_s
+            .iter()
+            .enumerate()
+            .map(rate)
+            .fold(0.0, f64::max)
+    }
+
     /// The share of `car`'s grip that is used at each section.
     pub fn grip_used(&self, car: &PointMass) -> Vec<f64> {
         if !self.forces_mps2.is_empty() {

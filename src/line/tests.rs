@@ -136,6 +136,53 @@ fn corner_speed_meets_the_lateral_limit_or_never_binds() {
     assert!(at(&locked, 10.0) < 0.3 * at(&table, 10.0));
 }
 
+/// A clothoid of 0.0002 1/m per metre between a straight and a bend of 50 m, in and out. A steering rate of 0.0104 rad/s over 2.6 m is
+/// 0.004 1/(m s): 20 m/s, where the bend itself is taken at 27 m/s.
+#[test]
+fn slow_steering_holds_the_car_back_where_curvature_changes() {
+    let free = gt_car();
+    let steered = PointMass {
+        max_steer_rate_radps: Some(0.0104),
+        ..free.clone()
+    };
+    let ramp = (0..20).map(|i| 0.001 * f64::from(i));
+    let bend = std::iter::repeat_n(0.02, 40);
+    let straight = std::iter::repeat_n(0.0, 100);
+    let curvature: Vec<f64> = straight
+        .chain(ramp.clone())
+        .chain(bend)
+        .chain(ramp.rev())
+        .collect();
+    // To the other side, too.
+    for sign in [1.0, -1.0] {
+        let curvature: Vec<f64> = curvature.iter().map(|k| sign * k).collect();
+        let lap = |car: &PointMass| {
+            let table = car.table().unwrap();
+            lap_profile(car, &table, &vec![5.0; curvature.len()], &curvature, 10.0, &[]).unwrap()
+        };
+        let (free, steered) = (lap(&free), lap(&steered));
+        assert!(
+            free.steering_rate_radps() > 0.0135,
+            "{}",
+            free.steering_rate_radps()
+        );
+        assert!((steered.steering_rate_radps() - 0.0104).abs() < 1e-9);
+        assert!(free.time_s + 1.0 < steered.time_s);
+        assert!((steered.v_mps[110] - 20.0).abs() < 1e-9, "{}", steered.v_mps[110]);
+        assert!(steered.v_mps[140] > 24.0 && steered.v_mps[50] > 40.0);
+    }
+    let bad = PointMass {
+        max_steer_rate_radps: Some(0.0),
+        ..gt_car()
+    };
+    assert!(
+        bad.table()
+            .unwrap_err()
+            .to_string()
+            .contains("max_steer_rate_radps")
+    );
+}
+
 #[test]
 fn other_exponents_bulge_the_ellipse() {
     let table = |exponent| {

@@ -74,6 +74,38 @@ pub trait GripEnvelope: Sync {
     fn lock_1pm(&self) -> f64 {
         f64::INFINITY
     }
+    /// The greatest rate at which the curvature may change in time (1/(m s)), as the steering allows.
+    fn curvature_rate(&self) -> f64 {
+        f64::INFINITY
+    }
+}
+
+/// The speed squared (m^2/s^2) up to which the steering follows the change of curvature along a segment, without regard to the side
+/// of the bend; with its relative derivatives by the curvature at both ends (m) and by the length (1/m).
+#[derive(Clone, Debug)]
+pub(super) struct SteeringLimit {
+    pub square: f64,
+    pub by_curvature: [f64; 2],
+    pub by_length: f64,
+}
+
+impl SteeringLimit {
+    /// That of segment `s` for a rate of curvature (1/(m s)); none where there is no limit.
+    pub fn of(shape: &Shape, s: usize, curvature_rate: f64) -> Option<Self> {
+        if curvature_rate.is_infinite() {
+            return None;
+        }
+        let bends = shape.bends_1pm();
+        let (from, to, length) = (bends[s], bends[(s + 1) % bends.len()], shape.driven_m()[s]);
+        let change = to.abs() - from.abs();
+        let square = (curvature_rate * length / change).powi(2);
+        let by_change = -2.0 / change;
+        square.is_finite().then(|| Self {
+            square,
+            by_curvature: [-from.signum() * by_change, to.signum() * by_change],
+            by_length: 2.0 / length,
+        })
+    }
 }
 
 /// The direction of a pass: driving out of a corner, or backwards into one for braking.
@@ -149,6 +181,8 @@ pub(super) struct Lap {
     /// Whether the car drives along each segment with its DRS open.
     pub open: Vec<bool>,
     corner_by_curvature: Vec<f64>,
+    /// Where the steering limits a point, by the segment before it.
+    steered: Vec<Option<SteeringLimit>>,
     drive: Vec<(usize, Origin)>,
     brake: Vec<(usize, Origin)>,
 }
@@ -175,6 +209,15 @@ impl Lap {
             let (square, slope) = shape.at_point(i, envelope, |car| corner_square(car, *curvature));
             corner.push(square);
             corner_by_curvature.push(slope);
+        }
+        let mut steered: Vec<Option<SteeringLimit>> = (0..n).map(|_| None).collect();
+        for s in 0..shape.driven_m().len() {
+            let limit = SteeringLimit::of(shape, s, envelope.curvature_rate());
+            let end = (s + 1) % n;
+            if let Some(limit) = limit.filter(|limit| limit.square < corner[end]) {
+                corner[end] = limit.square;
+                steered[end] = Some(limit);
+            }
         }
         if !shape.closed {
             let start = start_mps * start_mps;
@@ -209,6 +252,7 @@ impl Lap {
             bends,
             open,
             corner_by_curvature,
+            steered,
             drive,
             brake,
         }
@@ -251,7 +295,15 @@ impl Lap {
         for &(node, origin) in self.drive.iter().rev() {
             let bar = std::mem::take(&mut by_drive[node]);
             match origin {
-                Origin::Own => by_curvature[node] += bar * self.corner_by_curvature[node],
+                Origin::Own => match &self.steered[node] {
+                    Some(limit) => {
+                        let previous = (node + n - 1) % n;
+                        by_curvature[previous] += bar * limit.square * limit.by_curvature[0];
+                        by_curvature[node] += bar * limit.square * limit.by_curvature[1];
+                        by_length[previous] += bar * limit.square * limit.by_length;
+                    }
+                    None => by_curvature[node] += bar * self.corner_by_curvature[node],
+                },
                 Origin::Neighbour {
                     by_start,
                     by_curvature: c,

@@ -7,12 +7,13 @@ use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
 use crate::{Error, Result};
 
-/// The envelope of a point mass, linear in speed between its rows, and its steering lock.
+/// The envelope of a point mass, linear in speed between its rows, its steering lock and its steering rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointMassEnvelope {
     rows: Vec<EnvelopeRow>,
     in_bends: Option<BendTraction>,
     lock_1pm: f64,
+    curvature_rate: f64,
     open: Option<Box<Self>>,
     /// The same under loads over the mass (m/s^2), rising; none for level roads.
     loads: Vec<(f64, Self)>,
@@ -42,6 +43,7 @@ impl PointMassEnvelope {
                 .envelope
                 .open()
                 .map(|open| Box::new(Self::under_loads(open, car.relief, lock_1pm))),
+            curvature_rate: car.curvature_rate().unwrap_or(f64::INFINITY),
             ..Self::under_loads(&car.envelope, car.relief, lock_1pm)
         })
     }
@@ -51,6 +53,7 @@ impl PointMassEnvelope {
             rows: envelope.rows().to_vec(),
             in_bends: envelope.bend_traction().cloned(),
             lock_1pm,
+            curvature_rate: f64::INFINITY,
             open: None,
             loads: Vec::new(),
         }
@@ -157,6 +160,10 @@ impl GripEnvelope for PointMassEnvelope {
 
     fn lock_1pm(&self) -> f64 {
         self.lock_1pm
+    }
+
+    fn curvature_rate(&self) -> f64 {
+        self.curvature_rate
     }
 
     fn top_speed_mps(&self) -> f64 {

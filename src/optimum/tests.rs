@@ -99,6 +99,23 @@ impl GripEnvelope for WithDrs {
     }
 }
 
+/// The same car, whose steering is slow.
+struct Steered;
+
+impl GripEnvelope for Steered {
+    fn at(&self, v: f64) -> Grip {
+        Racer.at(v)
+    }
+
+    fn top_speed_mps(&self) -> f64 {
+        70.0
+    }
+
+    fn curvature_rate(&self) -> f64 {
+        0.05
+    }
+}
+
 /// A line that wanders over the middle of the road.
 fn wandering(variables: usize) -> Vec<f64> {
     let random = Random::new(11);
@@ -143,8 +160,9 @@ fn gradients_are_those_of_differences() {
     let (spline, _) = LineMap::parametrised(&cross_sections, &Parametrisation::control_points(40)).unwrap();
     for map in [LineMap::at_every_cross_section(&cross_sections), spline] {
         let spacing = spacing_m(&map, &vec![0.5; map.variables()]);
-        let cars: [&dyn GripEnvelope; 3] = [&Racer, &DrivenByTwo, &WithDrs];
-        for (spacing_m, car) in [None, Some(&spacing[..]), None].into_iter().zip(cars) {
+        let spacings = [None, Some(&spacing[..]), None, None];
+        let cars: [&dyn GripEnvelope; 4] = [&Racer, &DrivenByTwo, &WithDrs, &Steered];
+        for (spacing_m, car) in spacings.into_iter().zip(cars) {
             let problem = ReferenceProblem {
                 envelope: Some(car),
                 spacing_m,
@@ -169,6 +187,48 @@ fn gradients_are_those_of_differences() {
             }
         }
     }
+}
+
+/// On a line that a free car drives, one with slow steering takes longer, nowhere turns its wheels faster than it may, and is
+/// quicker on the line that the search finds for it.
+#[test]
+fn the_search_knows_how_fast_the_car_can_steer() {
+    let cross_sections = ellipse(200);
+    let (map, bounds) = LineMap::parametrised(&cross_sections, &Parametrisation::control_points(40)).unwrap();
+    let of = |car| ReferenceProblem {
+        envelope: Some(car),
+        bend: SegmentBend::Mean,
+        ..ReferenceProblem::of(&map)
+    };
+    let (free, steered) = (of(&Racer), of(&Steered));
+    let time = weights()[0].1;
+    let found = |problem: &ReferenceProblem| {
+        let start = vec![0.5; map.variables()];
+        fastest(problem, &bounds, &start, &DescentSettings::USUAL)
+            .unwrap()
+            .x
+    };
+    let (fast, steady) = (found(&free), found(&steered));
+    let [of_free, of_fast, of_steady] = [
+        free.cost(&time, &fast).0,
+        steered.cost(&time, &fast).0,
+        steered.cost(&time, &steady).0,
+    ];
+    assert!(
+        of_free < of_steady && of_steady < of_fast - 0.01,
+        "{of_free}, {of_steady}, {of_fast} s"
+    );
+    let shape = map.shape(&steady);
+    let v = steered.speeds_mps(&steady);
+    let mut bound = 0;
+    for (s, h) in shape.length_m.iter().enumerate() {
+        let next = (s + 1) % v.len();
+        let change = shape.curvature_1pm[next].abs() - shape.curvature_1pm[s].abs();
+        let rate = change.abs() / h * v[next];
+        assert!(rate < 0.05 * (1.0 + 1e-9), "{s}: {rate}");
+        bound += usize::from(rate > 0.0499);
+    }
+    assert!(bound > 0, "{bound}");
 }
 
 /// An open road, too: entry speed given, one fewer segment than points.

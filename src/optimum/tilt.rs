@@ -138,6 +138,10 @@ impl GripEnvelope for Tilted<'_> {
         self.level.lock_1pm()
     }
 
+    fn curvature_rate(&self) -> f64 {
+        self.level.curvature_rate()
+    }
+
     fn lean_mps2(&self) -> f64 {
         self.tilt.lean
     }

@@ -2,7 +2,7 @@
 
 use super::conic::{Affine, ConicProgram};
 use super::geometry::{LineMap, Shape};
-use super::lap::{GripEnvelope, Lap, corner_square};
+use super::lap::{GripEnvelope, Lap, SteeringLimit, corner_square};
 use crate::vehicle::envelope::root_left;
 
 /// Relative change of a squared speed beyond which no step goes: what is farther is no bound.
@@ -72,6 +72,21 @@ pub(super) fn add_time(
         shape.on_segment(s, lap.bends.ends[s], envelope, |car| {
             add_segment(program, map, car, shape, lap, (first, s));
         });
+    }
+    for s in 0..shape.length_m.len() {
+        let next = (s + 1) % n;
+        let limit = SteeringLimit::of(shape, s, envelope.curvature_rate());
+        // Speeds far below it are bound by others.
+        let Some(limit) = limit.filter(|limit| limit.square < (1.0 + FAR_CHANGE) * squares[next]) else {
+            continue;
+        };
+        let share = squares[next] / limit.square;
+        let mut terms = vec![(square(next), -share)];
+        shape.add_curvature(map, s, limit.by_curvature[0], &mut terms);
+        shape.add_curvature(map, next, limit.by_curvature[1], &mut terms);
+        shape.add_length(map, s, limit.by_length, &mut terms);
+        let constant = (1.0 - share).max(0.0);
+        program.add_nonnegative(Affine { constant, terms }.merged());
     }
     for i in 0..n {
         let (grip, lean) = shape.at_point(i, envelope, |car| {

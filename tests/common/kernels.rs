@@ -166,6 +166,7 @@ pub fn line_shape(closed: bool, terms: usize, lap: bool) -> LineShape {
         envelope_rows: 512,
         corner_rows: 1024,
         ellipse_rows: if closed { 256 } else { 0 },
+        steering_rate: terms != 1,
         traction: terms != 1,
         relief: None,
         drs: terms == 0,

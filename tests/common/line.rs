@@ -121,6 +121,8 @@ pub fn random_car(random: &mut Random) -> PointMass {
     }
     if random.within(0.0, 1.0) < 0.5 {
         car.max_steer_rad = Some(0.1745);
+        // Slow enough to hold cars back in many a bend.
+        car.max_steer_rate_radps = Some(0.12);
     }
     if random.within(0.0, 1.0) < 0.5 {
         let (driven, power) = (random.within(0.4, 0.9), random.within(0.5, 1.0));

@@ -195,7 +195,10 @@ fn structs_of_lines_have_the_hosts_offsets() {
         ("lock_radius", offset_of!(LineStretch, lock_radius)),
         ("gravity", offset_of!(LineStretch, gravity)),
         ("coasting", offset_of!(LineStretch, coasting)),
-        ("spare", offset_of!(LineStretch, spare)),
+        (
+            "curvature_rate_squared",
+            offset_of!(LineStretch, curvature_rate_squared),
+        ),
     ];
     let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {
         pairs

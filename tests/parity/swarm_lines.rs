@@ -80,11 +80,12 @@ fn a_swarm_of_one_objective_moves_on_the_device_as_in_lanes() {
             assert!(candidates == there.candidates().unwrap(), "{generation}");
         }
         there.evaluate(&mut judge).unwrap();
-        let measured = there.objectives().unwrap();
-        here.tell(&Evaluation::of_rows(
-            measured.iter().map(|cost| (vec![*cost], None)).collect(),
-        ))
-        .unwrap();
+        let told = Evaluation {
+            objectives: there.objectives().unwrap(),
+            failures: vec![None; PARTICLES],
+            violations: Vec::new(),
+        };
+        here.tell(&told).unwrap();
         bests.push(there.learn_and_move().unwrap().best[0]);
         if exact {
             assert_eq!(there.best(), here.best(), "{generation}");

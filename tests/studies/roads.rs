@@ -183,6 +183,29 @@ fn clearance_m(circuit: &Surveyed, folder: &Path) -> f64 {
     least
 }
 
+/// A car whose wheels turn at 5 deg/s takes longer than the usual one, on a line on which they never turn faster.
+#[test]
+fn slow_steering_is_obeyed_by_the_fastest_line() {
+    let laps = [40.0, 5.0].map(|steering_rate_deg_s| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let settings = RacelineSettings {
+            steering_rate_deg_s,
+            ..STREET.settings(folder.path())
+        };
+        let summary = found(&settings, folder.path());
+        let line = &summary.best["lap_time"];
+        let exact = summary.exact["lap_time"].as_ref().expect("one");
+        println!(
+            "{steering_rate_deg_s} deg/s: {:.3} s, turned at {:.2} deg/s; reference {:.3} s",
+            line.lap_time_fine_s, line.steering_rate_deg_s, exact.lap_time_fine_s
+        );
+        assert!(line.clearance_m >= -0.01);
+        assert!(line.steering_rate_deg_s < steering_rate_deg_s * (1.0 + 1e-9));
+        line.lap_time_fine_s
+    });
+    assert!(laps[0] + 0.1 < laps[1], "{laps:?} s");
+}
+
 #[test]
 fn fastest_lines_are_on_the_road() {
     for (name, circuit) in [("hairpin", &HAIRPIN), ("street", &STREET), ("eight", &EIGHT)] {

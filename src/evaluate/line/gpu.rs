@@ -47,6 +47,7 @@ impl DeviceKernel<LineProblem> for LineDevice {
                 traction: Vec::new(),
                 open: None,
                 loads: Default::default(),
+                curvature_rate_squared: None,
             },
             |envelope| envelope.stored::<f32>(),
         );

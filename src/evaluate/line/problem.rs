@@ -214,8 +214,17 @@ impl LineProblem {
     /// # Errors
     /// As [`Parametrisation::fit`].
     pub fn candidate(&self, alpha: &[f64]) -> Result<Vec<f64>> {
-        let coefficients = self.parametrisation.fit(&self.cross_sections, alpha)?;
-        Ok(self.parametrisation.variables_of(&coefficients))
+        Ok(self.candidates(&[alpha])?.swap_remove(0))
+    }
+
+    /// As [`LineProblem::candidate`], for several lines.
+    ///
+    /// # Errors
+    /// As [`Parametrisation::fit`].
+    pub fn candidates(&self, lines: &[&[f64]]) -> Result<Vec<Vec<f64>>> {
+        let fitted = self.parametrisation.fit_all(&self.cross_sections, lines)?;
+        let variables = |coefficients: &Vec<f64>| self.parametrisation.variables_of(coefficients);
+        Ok(fitted.iter().map(variables).collect())
     }
 
     /// Moves the variables of `candidate` so that its line lies on the road at every cross-section; returns the sum of the squared

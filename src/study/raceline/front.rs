@@ -130,7 +130,11 @@ pub(super) fn search_front(
     evaluations += insert_all([&mut sought], judge.as_mut(), &lines)?;
     if settings.searches_locally() && settings.objectives.iter().all(|o| solvers.solves(*o)) {
         // Lines between others start from what these came to.
-        let weights = lattice(settings.objectives.len(), LATTICE);
+        let mut weights = lattice(settings.objectives.len(), LATTICE);
+        if !known.is_empty() {
+            // The best by one objective alone is known.
+            weights.retain(|shares| shares.iter().all(|share| *share < 1.0));
+        }
         for wave in 0..WAVES {
             let starts = starts_along(&sought, weights.iter().skip(wave).step_by(WAVES), settings);
             let polished = std::thread::scope(|scope| {
@@ -205,10 +209,8 @@ pub fn starting_lines(
     lines.push(vec![0.0; n]);
     lines.push(vec![1.0; n]);
     let random = Random::new(settings.seed);
-    let mut candidates: Vec<Vec<f64>> = lines
-        .iter()
-        .map(|alpha| problem.candidate(alpha))
-        .collect::<Result<_>>()?;
+    let lines: Vec<&[f64]> = lines.iter().map(Vec::as_slice).collect();
+    let mut candidates = problem.candidates(&lines)?;
     let all: Vec<Vec<f64>> = candidates[..given.len()].to_vec();
     let variables = &problem.problem.variables;
     for particle in candidates.len()..settings.population {

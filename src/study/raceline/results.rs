@@ -41,6 +41,8 @@ pub struct LineFigures {
     pub clearance_m: f64,
     /// Distance along the line where that is (m).
     pub clearance_station_m: f64,
+    /// The fastest turn of the front wheels on the fine spline (deg/s), without regard to the side of the bend.
+    pub steering_rate_deg_s: f64,
 }
 
 impl LineFigures {
@@ -55,6 +57,11 @@ impl LineFigures {
             integral_kappa2_fine_1pm: line.fine.integral_kappa2_1pm,
             clearance_m: line.clearance.margin_m,
             clearance_station_m: line.clearance.station_m,
+            steering_rate_deg_s: line
+                .fine
+                .lap
+                .as_ref()
+                .map_or(0.0, |lap| lap.steering_rate_radps().to_degrees()),
         }
     }
 }

@@ -262,6 +262,8 @@ pub struct LineShape {
     pub corner_rows: usize,
     /// Rows of the table of the ellipse, zero where there is none.
     pub ellipse_rows: usize,
+    /// Whether the rate of steering is limited.
+    pub steering_rate: bool,
     /// Whether cells of traction in bends follow the table of limits.
     pub traction: bool,
     /// Whether the limits with the DRS open follow those with it shut.
@@ -297,6 +299,7 @@ impl LineShape {
             .count("ENVELOPE_ROWS", self.envelope_rows)
             .count("CORNER_ROWS", self.corner_rows)
             .count("ELLIPSE_ROWS", self.ellipse_rows)
+            .flag("HAS_STEERING_RATE", self.steering_rate)
             .flag("HAS_TRACTION", self.traction)
             .count("TRACTION_SPEEDS", TRACTION_SPEEDS)
             .count("TRACTION_ROOTS", TRACTION_ROOTS)

@@ -44,8 +44,8 @@ pub struct LineStretch {
     pub gravity: f32,
     /// The share of the mass that is accelerated which rotates.
     pub coasting: f32,
-    /// Not used.
-    pub spare: u32,
+    /// Square of the greatest rate at which the curvature may change in time, 1/(m^2 s^2).
+    pub curvature_rate_squared: f32,
 }
 
 impl LineStretch {
@@ -67,7 +67,7 @@ impl LineStretch {
             lock_radius: envelope.loads.lock_radius,
             gravity: GRAVITY_MPS2 as f32,
             coasting: envelope.loads.coasting,
-            spare: 0,
+            curvature_rate_squared: envelope.curvature_rate_squared.unwrap_or(0.0),
         }
     }
 }

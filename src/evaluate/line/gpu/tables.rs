@@ -157,6 +157,7 @@ impl LineTables {
             envelope_rows: envelope.rows.len() / 8,
             corner_rows: corners.len() / 4,
             ellipse_rows,
+            steering_rate: envelope.curvature_rate_squared.is_some(),
             traction: !envelope.traction.is_empty(),
             drs: open.is_some(),
             relief,

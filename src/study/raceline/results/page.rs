@@ -306,6 +306,7 @@ pub fn lines_table(summary: &Summary) -> Table<'static> {
         .number("length, fine", "m", |r| r.1.length_fine_m)
         .number("curvature\u{b2}, fine", "1/m", |r| r.1.integral_kappa2_fine_1pm)
         .number("clearance", "m", |r| r.1.clearance_m)
+        .number("steering rate", "deg/s", |r| r.1.steering_rate_deg_s)
         .table()
 }
 
