@@ -3,9 +3,9 @@
 // One lane per candidate. Segment lengths, curvatures and speeds squared stand in a buffer, in tiles of TILE lanes: section by
 // section within a tile, so that neighbouring lanes and neighbouring sections read neighbouring memory. All lanes start a lap's
 // passes at the same section for the same reason. The constants CLOSED, TERMS, WANTS_INTEGRAL, WANTS_LAP, ENVELOPE_ROWS,
-// CORNER_ROWS, ELLIPSE_ROWS, HAS_STEERING_RATE, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, HAS_RELIEF, LOADS, LOADS_AT, LOAD_STEP,
-// WORKGROUP and TILE are generated, and
-// so are the bindings 1 to 4: `sections`; `envelope` in rows of lateral, grip, drive, drag at their start and then of their rises,
+// CORNER_ROWS, ELLIPSE_ROWS, HAS_STEERING_RATE, HAS_TRACTION, TRACTION_SPEEDS, TRACTION_ROOTS, HAS_DRS, OPEN_AT, HAS_RELIEF,
+// LOADS, LOADS_AT, LOAD_STEP, WORKGROUP and TILE are generated, and so are the bindings 1 to 4: `sections`; `envelope` in rows of
+// lateral, grip, drive, drag at their start and then of their rises,
 // behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open. On a road that is not level and dry
 // the same again from LOADS_AT on, under each of LOADS loads, LOAD_STEP rows apart; behind the sections then stand as many whose
 // weights are height and banking: `step_rise`, `across_rise`, sine and cosine, and whose `step` is the friction at the right end and

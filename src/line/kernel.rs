@@ -245,7 +245,7 @@ fn steered_corner<R: Lookup, G: Ground<R>>(
         return most;
     };
     let change = ground.bend() - before.bend();
-    // Over a straight there is none; one of a hundred-thousandth of a curve of 100 m stands for it.
+    // Where there is none, one of 1e-7 1/m stands for it.
     let change_squared = (change * change).max(R::lit(1e-14));
     most.min(R::load(rate_squared) * (length * length) / change_squared)
 }

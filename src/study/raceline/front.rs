@@ -122,8 +122,6 @@ pub(super) fn search_front(
                 .collect()
         }));
     }
-    // Lines that leave the road between cross-sections are no worse than what they are moved in to: those that are dominated on the
-    // road need not be moved in.
     let mut archive = Archive::new(settings.archive, Truncation::Contribution);
     let mut sought = archive.clone();
     let mut evaluations = swarm.evaluations();
@@ -145,8 +143,24 @@ pub(super) fn search_front(
             evaluations += insert_all([&mut sought, &mut archive], judge.as_mut(), &polished)?;
         }
     }
-    let left = on_road(setup, settings, &[known, &sought.positions[..]].concat())?;
-    evaluations += insert_all([&mut archive], judge.as_mut(), &left)?;
+    let kept = on_road(setup, settings, known)?;
+    evaluations += insert_all([&mut archive], judge.as_mut(), &kept)?;
+    // Lines that leave the road between cross-sections are better than what they are moved in to, nearly always. Those that a line on the
+    // road dominates even so are left out; the best come first, so that there are more of these.
+    for pool in [sought.positions, lines] {
+        let found = judge.evaluate(&pool.concat())?;
+        let width = settings.objectives.len();
+        let beaten = |row: &[f64]| {
+            let mut members = archive.objectives.iter();
+            members.any(|member| member.iter().zip(row).all(|(m, x)| m <= x))
+        };
+        let due = pool.into_iter().enumerate();
+        let due = due.filter(|(i, _)| found.success(*i, width).is_some_and(|row| !beaten(row)));
+        let due: Vec<Vec<f64>> = due.map(|(_, line)| line).collect();
+        evaluations += found.failures.len() as u64;
+        let kept = on_road(setup, settings, &due)?;
+        evaluations += insert_all([&mut archive], judge.as_mut(), &kept)?;
+    }
 
     // The point that the reference line and the edges of the archive do not exceed.
     let middle = judge.evaluate(&cross_sections.reference)?.objectives;
