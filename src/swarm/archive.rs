@@ -115,6 +115,12 @@ impl Archive {
         self.violation
     }
 
+    /// Whether a member dominates or equals these objectives.
+    pub fn beats(&self, objectives: &[f64]) -> bool {
+        let beats = |member: &Vec<f64>| member.iter().zip(objectives).all(|(x, y)| x <= y);
+        self.objectives.iter().any(beats)
+    }
+
     /// [`Archive::insert_violating`] of a solution that violates nothing.
     pub fn insert(&mut self, position: &[f64], objectives: &[f64]) -> bool {
         self.insert_violating(position, objectives, 0.0)
@@ -128,8 +134,7 @@ impl Archive {
         if objectives.iter().any(|x| !x.is_finite()) || !self.reached(violation) {
             return false;
         }
-        let beaten = |m: &Vec<f64>| m.iter().zip(objectives).all(|(x, y)| x <= y);
-        if self.objectives.iter().any(beaten) {
+        if self.beats(objectives) {
             return false;
         }
         let mut i = 0;

@@ -53,8 +53,8 @@ impl Trail {
         self.since.get_or_insert_with(Instant::now);
     }
 
-    /// Notes the front, or the best of one objective, after an iteration of the planned number, if it is time to. Iterations that are taken again are not noted
-    /// twice.
+    /// Notes the front, or the best of one objective, after an iteration of the planned number, if it is time to. Iterations that are
+    /// taken again are not noted twice.
     pub fn note(&mut self, now: Counters, planned: usize, front: impl FnOnce() -> Vec<Vec<f64>>) {
         if let Some(since) = self.since.replace(Instant::now()) {
             self.elapsed_s += since.elapsed().as_secs_f64();

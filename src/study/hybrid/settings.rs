@@ -166,7 +166,7 @@ settings! {
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
-            "Where particles live, of the front or with algorithm thesis; auto: on the device from 4096 particles on, where a graphics processor evaluates";
+            "Where the particles of the front and of algorithm thesis live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where laps are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),

@@ -222,7 +222,7 @@ settings! {
         archive: usize as "swarm.archive" ["-"] = 100, count(2, 100_000).search(),
             "Members of the archive of the multi-objective swarm";
         place: SwarmPlace as "swarm.place" ["-"] = SwarmPlace::Auto, choice().flag(Flag::Value("swarm")).search(),
-            "Where particles live, of several objectives or with algorithm thesis; auto: on the device from 4096 particles on, where a graphics processor evaluates";
+            "Where the particles of a front and of algorithm thesis live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
         seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
             "Seed of all random numbers";
         polish: bool ["-"] = true, switch(true).flag(Flag::Switch("no_polish", false)).search(),

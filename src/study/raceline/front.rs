@@ -145,17 +145,13 @@ pub(super) fn search_front(
     }
     let kept = on_road(setup, settings, known)?;
     evaluations += insert_all([&mut archive], judge.as_mut(), &kept)?;
-    // Lines that leave the road between cross-sections are better than what they are moved in to, nearly always. Those that a line on the
-    // road dominates even so are left out; the best come first, so that there are more of these.
+    // Moving a line in costs it something, nearly always. Those that a line on the road dominates before are left out. The best come
+    // first, so that more are.
     for pool in [sought.positions, lines] {
         let found = judge.evaluate(&pool.concat())?;
         let width = settings.objectives.len();
-        let beaten = |row: &[f64]| {
-            let mut members = archive.objectives.iter();
-            members.any(|member| member.iter().zip(row).all(|(m, x)| m <= x))
-        };
         let due = pool.into_iter().enumerate();
-        let due = due.filter(|(i, _)| found.success(*i, width).is_some_and(|row| !beaten(row)));
+        let due = due.filter(|(i, _)| found.success(*i, width).is_some_and(|row| !archive.beats(row)));
         let due: Vec<Vec<f64>> = due.map(|(_, line)| line).collect();
         evaluations += found.failures.len() as u64;
         let kept = on_road(setup, settings, &due)?;
