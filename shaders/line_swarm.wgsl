@@ -42,12 +42,14 @@ fn candidate_of(id: vec3<u32>, groups: vec3<u32>) -> u32 {
     return id.y * groups.x * BLOCK + id.x;
 }
 
+// A slice of a candidate's figures: along the third dimension of the dispatch lie the slices of a block.
 @compute @workgroup_size(BLOCK)
 fn figures_of_positions(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let candidate = candidate_of(id, groups);
     if candidate >= exchange.candidates { return; }
     let who = exchange.first + candidate;
-    for (var k = 0u; k < exchange.figures; k++) {
+    let width = (exchange.figures + groups.z - 1u) / groups.z;
+    for (var k = id.z * width; k < min((id.z + 1u) * width, exchange.figures); k++) {
         let at = given[place(who, exchange.rows, scaled[k].row)];
         taken[k * exchange.stride + candidate] = scaled[k].lower + scaled[k].range * at;
     }

@@ -46,15 +46,16 @@ const PULLS: u32 = 8u;
 const RECOMBINE: u32 = 9u;
 
 @group(0) @binding(0) var<uniform> generation: Generation;
-// Positions of the archive's members, ordered by their contribution, the greatest first; then their objectives, three to each.
+// Of the archive's members: to note who may enter it their objectives, three to each; to move their positions, ordered by their
+// contribution, the greatest first.
 @group(0) @binding(1) var<storage, read> archive: array<f32>;
 @group(0) @binding(2) var<storage, read_write> position: array<f32>;
 @group(0) @binding(3) var<storage, read_write> velocity: array<f32>;
 @group(0) @binding(4) var<storage, read_write> best_position: array<f32>;
 @group(0) @binding(5) var<storage, read_write> best_objectives: array<f32>;
 @group(0) @binding(6) var<storage, read_write> objectives: array<f32>;
-// How many points no member dominates or equals, and how many particles failed for each reason; then those points: the particle
-// and its objectives, three to each.
+// How many points may enter the archive, and how many particles failed for each reason; then those points: the particle and its
+// objectives, three to each.
 struct Found {
     count: atomic<u32>,
     failed: array<atomic<u32>, REASONS>,
@@ -79,7 +80,7 @@ fn held(x: f32) -> f32 {
 fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let who = id.y * groups.x * BLOCK + id.x;
     if who >= generation.particles { return; }
-    scatter_one(who);
+    scatter_one(who, vec2<u32>(0u, generation.dimensions));
     for (var k = 0u; k < generation.dimensions; k++) {
         let i = place(who, generation.dimensions, k);
         best_position[i] = position[i];
@@ -89,9 +90,9 @@ fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     }
 }
 
-fn scatter_one(who: u32) {
+fn scatter_one(who: u32, slice: vec2<u32>) {
     var four = vec4<u32>(0u);
-    for (var k = 0u; k < generation.dimensions; k++) {
+    for (var k = slice.x; k < slice.y; k++) {
         if k % 4u == 0u { four = words(START, who, k / 4u); }
         let i = place(who, generation.dimensions, k);
         position[i] = unit(four[k % 4u]);
@@ -99,8 +100,7 @@ fn scatter_one(who: u32) {
     }
 }
 
-// Takes positions for personal bests where their objectives are better; where neither is better, at random. Then notes the
-// particle if no member of the archive dominates or equals it.
+// Takes positions for personal bests where their objectives are better; where neither is better, at random. Counts failures.
 @compute @workgroup_size(BLOCK)
 fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let who = id.y * groups.x * BLOCK + id.x;
@@ -110,26 +110,27 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
     var no_better = true;
     var sound = true;
     var reason = 0u;
-    var at = vec3<f32>(0.0);
     for (var k = 0u; k < width; k++) {
         let i = place(who, width, k);
         let value = objectives[i];
         let best = best_objectives[i];
         no_worse = no_worse && value <= best;
         no_better = no_better && best <= value;
-        let size = bitcast<u32>(value) & 0x7fffffffu;
+        let size = size_of(value);
         if size >= FAILED {
             sound = false;
             // What is no number, or a number beyond the costs, has the first reason.
             reason = select(0u, size - FAILED, size - FAILED < REASONS);
         }
-        at[k] = value;
     }
-    if !sound { atomicAdd(&found.failed[reason], 1u); }
+    if !sound {
+        atomicAdd(&found.failed[reason], 1u);
+        return;
+    }
     let heads = words(COIN, who, 0u).x < 0x80000000u;
     let better = no_worse && !no_better;
     let open = no_worse == no_better;
-    if sound && (better || (open && heads)) {
+    if better || (open && heads) {
         for (var k = 0u; k < generation.dimensions; k++) {
             let i = place(who, generation.dimensions, k);
             best_position[i] = position[i];
@@ -139,36 +140,107 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
             best_objectives[i] = objectives[i];
         }
     }
-    let rows = generation.members * generation.dimensions;
-    for (var member = 0u; member < generation.members; member++) {
-        let i = rows + 3u * member;
-        sound = sound && !(archive[i] <= at.x && archive[i + 1u] <= at.y && archive[i + 2u] <= at.z);
-        if !sound { break; }
-    }
-    if sound {
-        let slot = atomicAdd(&found.count, 1u);
-        found.points[slot] = vec4<u32>(who, bitcast<vec3<u32>>(at));
-    }
 }
 
+// The bits of the size of an objective, in the order of the sizes.
+fn size_of(value: f32) -> u32 {
+    return bitcast<u32>(value) & 0x7fffffffu;
+}
+
+// Objectives of the block's particles; those of particles that may not enter the archive dominate nothing.
+var<workgroup> block: array<vec3<f32>, BLOCK>;
+
+// Notes the particles that neither a member of the archive nor another particle of their block dominates or equals; of equal ones the
+// first.
 @compute @workgroup_size(BLOCK)
-fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+fn note(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
     let who = id.y * groups.x * BLOCK + id.x;
-    if who >= generation.particles { return; }
+    var at = vec3<f32>(UNKNOWN);
+    if who < generation.particles { at = may_enter(who); }
+    block[lane] = at;
+    workgroupBarrier();
+    if at.x == UNKNOWN { return; }
+    for (var other = 0u; other < BLOCK; other++) {
+        let its = block[other];
+        if all(its <= at) && (other < lane || any(its != at)) { return; }
+    }
+    let slot = atomicAdd(&found.count, 1u);
+    found.points[slot] = vec4<u32>(who, bitcast<vec3<u32>>(at));
+}
+
+// The objectives of a particle; unknown ones if it has failed or a member of the archive dominates or equals it.
+fn may_enter(who: u32) -> vec3<f32> {
+    var at = vec3<f32>(0.0);
+    for (var k = 0u; k < generation.objectives; k++) {
+        at[k] = objectives[place(who, generation.objectives, k)];
+        if size_of(at[k]) >= FAILED { return vec3<f32>(UNKNOWN); }
+    }
+    for (var i = 0u; i < 3u * generation.members; i += 3u) {
+        if archive[i] <= at.x && archive[i + 1u] <= at.y && archive[i + 2u] <= at.z { return vec3<f32>(UNKNOWN); }
+    }
+    return at;
+}
+
+// What a particle does, in the order in which a block does it; those that are disturbed as well stand together.
+const CROSSES: u32 = 0u;
+const IS_PULLED: u32 = 1u;
+const IS_PULLED_AND_DISTURBED: u32 = 2u;
+const DIFFERS_AND_IS_DISTURBED: u32 = 3u;
+const DIFFERS: u32 = 4u;
+// Beyond the last particle.
+const IS_ABSENT: u32 = 5u;
+
+// How many of the block do each, and its particles in that order: the particle, its leader and what it does.
+var<workgroup> doing: array<atomic<u32>, 6>;
+var<workgroup> turns: array<vec3<u32>, BLOCK>;
+
+// Moves a slice of the coordinates of a block's particles: along the third dimension of the dispatch lie the slices of a block. Draws
+// go by fours. Particles that do the same are neighbours, as lanes of a subgroup wait for those that do something else.
+@compute @workgroup_size(BLOCK)
+fn advance(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let d = generation.dimensions;
+    let width = ((d + groups.z - 1u) / groups.z + 3u) / 4u * 4u;
+    let slice = vec2<u32>(id.z * width, min((id.z + 1u) * width, d));
+    let particle = id.y * groups.x * BLOCK + id.x;
     if generation.members == 0u {
         // The archive is empty: nothing to learn from yet.
-        scatter_one(who);
+        if particle < generation.particles { scatter_one(particle, slice); }
         return;
     }
+    var mine = vec3<u32>(particle, 0u, IS_ABSENT);
+    if particle < generation.particles { mine = turn_of(particle); }
+    let rank = atomicAdd(&doing[mine.z], 1u);
+    workgroupBarrier();
+    var at = rank;
+    for (var other = 0u; other < mine.z; other++) { at += atomicLoad(&doing[other]); }
+    turns[at] = mine;
+    workgroupBarrier();
+    let turn = turns[lane];
+    let what = turn.z;
+    if what == CROSSES { cross_one(turn.x, turn.y, slice); }
+    if what == IS_PULLED || what == IS_PULLED_AND_DISTURBED { pull_one(turn.x, turn.y, slice); }
+    if what == DIFFERS || what == DIFFERS_AND_IS_DISTURBED { differ_one(turn.x, turn.y, slice); }
+    if what == IS_PULLED_AND_DISTURBED || what == DIFFERS_AND_IS_DISTURBED { disturb_one(turn.x, slice); }
+}
+
+fn turn_of(who: u32) -> vec3<u32> {
     let choice = words(RECOMBINE, who, 0u);
     var leader = below(choice.y, generation.members);
     if generation.tournament == 1u { leader = min(leader, below(choice.z, generation.members)); }
     let coin = unit(choice.x);
-    if coin < generation.crossings {
-        cross_one(who, leader);
-        return;
-    }
-    move_one(who, leader, coin < generation.no_pulls, unit(choice.w) < generation.mutation_share);
+    let disturbed = unit(choice.w) < generation.mutation_share;
+    var what = select(IS_PULLED, IS_PULLED_AND_DISTURBED, disturbed);
+    if coin < generation.no_pulls { what = select(DIFFERS, DIFFERS_AND_IS_DISTURBED, disturbed); }
+    if coin < generation.crossings { what = CROSSES; }
+    return vec3<u32>(who, leader, what);
 }
 
 // Shares of the velocity and of the ways to the own best and to the leader.
@@ -189,69 +261,76 @@ fn pulls_of(draws: vec4<u32>) -> Pulls {
     return Pulls(chi * generation.inertia, chi * c1, chi * c2);
 }
 
-// Coordinate by coordinate, so that each is read and written once: by the pulls or, if it `differs`, from an archive member along the
-// difference of two others, in some of the coordinates; then polynomial mutation of each with probability one over their number if
-// it is `disturbed`.
-fn move_one(who: u32, leader: u32, differs: bool, disturbed: bool) {
+// By inertia and the pulls to the own best and to the leader.
+fn pull_one(who: u32, leader: u32, slice: vec2<u32>) {
     let d = generation.dimensions;
     let draws = words(PULLS, who, 0u);
     let pulls = pulls_of(draws);
-    var to_own = pulls.own * unit(draws.z);
-    var to_leader = pulls.social * unit(draws.w);
-    var one = 0u;
-    var two = 0u;
-    var always = 0u;
-    if differs {
-        let picks = words(DIFFERENCE, who, 0u);
-        one = below(picks.x, generation.members);
-        two = below(picks.y, generation.members);
-        always = below(picks.z, d);
+    if generation.per_dimension == 0u {
+        let shares = Pulls(pulls.inertia, pulls.own * unit(draws.z), pulls.social * unit(draws.w));
+        for (var k = slice.x; k < slice.y; k++) { pull_coordinate(place(who, d, k), archive[leader * d + k], shares); }
+        return;
     }
-    var first = vec4<u32>(0u);
-    var second = vec4<u32>(0u);
-    var mutation = vec4<u32>(0u);
-    for (var k = 0u; k < d; k++) {
-        let i = place(who, d, k);
-        let towards = archive[leader * d + k];
-        var x = position[i];
-        var v = 0.0;
-        if differs {
-            if k % 4u == 0u { first = words(DIFFERENCE, who, 1u + k / 4u); }
-            let chosen = k == always || unit(first[k % 4u]) < CROSSOVER;
+    for (var four = slice.x / 4u; 4u * four < slice.y; four++) {
+        let first = words(COGNITIVE, who, four);
+        let second = words(SOCIAL, who, four);
+        for (var k = 4u * four; k < min(4u * four + 4u, slice.y); k++) {
+            let shares = Pulls(pulls.inertia, pulls.own * unit(first[k % 4u]), pulls.social * unit(second[k % 4u]));
+            pull_coordinate(place(who, d, k), archive[leader * d + k], shares);
+        }
+    }
+}
+
+fn pull_coordinate(i: u32, towards: f32, shares: Pulls) {
+    let x = position[i];
+    let wanted = shares.inertia * velocity[i] + shares.own * (best_position[i] - x) + shares.social * (towards - x);
+    let speed = min(max(wanted, -generation.speed_limit), generation.speed_limit);
+    let moved = x + speed;
+    let inside = held(moved);
+    velocity[i] = select(speed * generation.rebound, speed, moved == inside);
+    position[i] = inside;
+}
+
+// From an archive member along the difference of two others, in some of the coordinates.
+fn differ_one(who: u32, leader: u32, slice: vec2<u32>) {
+    let d = generation.dimensions;
+    let picks = words(DIFFERENCE, who, 0u);
+    let one = below(picks.x, generation.members);
+    let two = below(picks.y, generation.members);
+    let always = below(picks.z, d);
+    for (var four = slice.x / 4u; 4u * four < slice.y; four++) {
+        let draws = words(DIFFERENCE, who, 1u + four);
+        for (var k = 4u * four; k < min(4u * four + 4u, slice.y); k++) {
+            let chosen = k == always || unit(draws[k % 4u]) < CROSSOVER;
             let step = SCALE * (archive[one * d + k] - archive[two * d + k]);
-            x = held(towards + select(0.0, step, chosen));
-        } else {
-            if generation.per_dimension == 1u {
-                if k % 4u == 0u {
-                    first = words(COGNITIVE, who, k / 4u);
-                    second = words(SOCIAL, who, k / 4u);
-                }
-                to_own = pulls.own * unit(first[k % 4u]);
-                to_leader = pulls.social * unit(second[k % 4u]);
-            }
-            let wanted = pulls.inertia * velocity[i] + to_own * (best_position[i] - x) + to_leader * (towards - x);
-            let speed = min(max(wanted, -generation.speed_limit), generation.speed_limit);
-            let moved = x + speed;
-            x = held(moved);
-            v = select(speed * generation.rebound, speed, moved == x);
+            let i = place(who, d, k);
+            position[i] = held(archive[leader * d + k] + select(0.0, step, chosen));
+            velocity[i] = 0.0;
         }
-        if disturbed {
-            if k % 2u == 0u { mutation = words(MUTATION, who, k / 2u); }
+    }
+}
+
+// Polynomial mutation of each coordinate with probability one over their number.
+fn disturb_one(who: u32, slice: vec2<u32>) {
+    let d = generation.dimensions;
+    for (var two = slice.x / 2u; 2u * two < slice.y; two++) {
+        let draws = words(MUTATION, who, two);
+        for (var k = 2u * two; k < min(2u * two + 2u, slice.y); k++) {
             let pair = 2u * (k % 2u);
-            if unit(mutation[pair]) * f32(d) < 1.0 {
-                x = polynomial(x, unit(mutation[pair + 1u]), generation.mutation_power, generation.mutation_root);
+            if unit(draws[pair]) * f32(d) < 1.0 {
+                let i = place(who, d, k);
+                position[i] =
+                    polynomial(position[i], unit(draws[pair + 1u]), generation.mutation_power, generation.mutation_root);
             }
         }
-        velocity[i] = v;
-        position[i] = x;
     }
 }
 
 // To a place between or about two archive members, each coordinate by itself, disturbed by polynomial mutation.
-fn cross_one(who: u32, leader: u32) {
+fn cross_one(who: u32, leader: u32, slice: vec2<u32>) {
     let d = generation.dimensions;
     let other = below(words(RECOMBINE, who, 1u).x, generation.members);
-    for (var k = 0u; k < d; k++) {
+    for (var k = slice.x; k < slice.y; k++) {
         let draws = words(RECOMBINE, who, 2u + k);
         var x = cross_coordinates(archive[leader * d + k], archive[other * d + k], draws.x, unit(draws.y));
         if unit(draws.z) * f32(d) < 1.0 {

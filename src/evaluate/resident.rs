@@ -38,9 +38,27 @@ pub trait DeviceObjectives {
     ) -> crate::Result<()>;
 }
 
+/// Coordinates of a particle that a lane of a card takes: a card is only filled by many lanes, and has those of few particles early.
+#[cfg(feature = "gpu")]
+const SLICE: usize = 16;
+
 /// Workgroups along two dimensions, for a particle to a lane.
+#[cfg(feature = "gpu")]
 pub(crate) fn groups(particles: usize) -> (u32, u32) {
     let all = particles.div_ceil(BLOCK);
     let wide = all.clamp(1, 1 << 15);
     (wide as u32, all.div_ceil(wide) as u32)
+}
+
+/// Workgroups along three dimensions, for a slice of the `width` coordinates of a particle to a lane. A software driver has no more
+/// lanes than processors, and takes all of a particle at once.
+#[cfg(feature = "gpu")]
+pub(crate) fn sliced_groups(context: &super::gpu::GpuContext, particles: usize, width: usize) -> [u32; 3] {
+    let (x, y) = groups(particles);
+    let slices = if context.is_shaped_for_a_card() {
+        width.div_ceil(SLICE)
+    } else {
+        1
+    };
+    [x, y, slices as u32]
 }

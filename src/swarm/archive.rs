@@ -5,6 +5,7 @@ use super::metrics::{Columns, dominates, non_dominated};
 use super::settings::{MopsoSettings, Truncation, setting};
 use super::space::Space;
 use crate::error::Result;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A bounded set of non-dominated solutions; all objectives are minimised.
@@ -61,6 +62,11 @@ pub(super) const MOST_MEASURED: usize = 5;
 /// and of which it does without a reference in archives of more members than [`FEW`], for the time that they take.
 const MOST_OF_MANY: usize = 4;
 const FEW: usize = 1000;
+
+/// Members that leave one by one with what they touched kept up to date; more leave faster.
+const FEW_LEAVE: usize = 8;
+/// Members whose shares a thread works out in a row.
+const MEASURED_TOGETHER: usize = 32;
 
 /// The reference point lies this share of the archive's range beyond its worst values, so that extremes count.
 const BEYOND: f64 = 0.1;
@@ -202,9 +208,22 @@ impl Archive {
             let first = self.objectives[0].clone();
             self.refresh(&first, false);
         }
-        while self.len() > self.capacity {
+        let beyond = self.len().saturating_sub(self.capacity);
+        if beyond > 0 && self.by_contribution() {
+            self.measure();
+        }
+        // To know what a member that leaves has touched takes longer than to ask anew for the shares of the few that may be the least.
+        let many = beyond > FEW_LEAVE;
+        for _ in 0..beyond {
             let least = self.least();
-            self.drop_least(least);
+            if many && self.by_contribution() {
+                self.drop_member(least);
+                self.move_reference();
+                // Where others leave, a share only grows.
+                self.shares.iter_mut().for_each(|share| share.exact = false);
+            } else {
+                self.drop_least(least);
+            }
         }
     }
 
@@ -306,9 +325,18 @@ impl Archive {
 
     /// Works out what the members contribute, once for all that ask.
     pub(super) fn measure(&mut self) {
-        for i in 0..self.shares.len() {
-            self.known(i);
-        }
+        let (columns, reference) = (&self.columns, &self.reference);
+        let unknown = self
+            .shares
+            .par_iter_mut()
+            .enumerate()
+            .with_min_len(MEASURED_TOGETHER);
+        unknown.filter(|(_, share)| !share.exact).for_each(|(i, share)| {
+            *share = Share {
+                least: columns.exclusive(i, reference),
+                exact: true,
+            };
+        });
     }
 
     fn by_contribution(&self) -> bool {
@@ -331,6 +359,21 @@ impl Archive {
 
     /// Updates the shares after `change` came, as the last member, or left.
     fn refresh(&mut self, change: &[f64], came: bool) {
+        self.move_reference();
+        let new = came.then(|| self.len() - 1);
+        for (i, most) in self.touched(change, new) {
+            let share = &mut self.shares[i];
+            share.exact = false;
+            if came {
+                // What a newcomer takes, they dominate both.
+                share.least = (share.least - most).max(0.0);
+            }
+        }
+    }
+
+    /// Brings the reference point behind the members there are, and the shares to it.
+    fn move_reference(&mut self) {
+        let width = self.objectives.first().map_or(0, Vec::len);
         let beyond = |k: usize| {
             let (low, high) = self.range(k);
             high + if high > low { BEYOND * (high - low) } else { 1.0 }
@@ -338,7 +381,7 @@ impl Archive {
         let reference = if self.fixed {
             self.reference.clone()
         } else {
-            (0..change.len()).map(beyond).collect()
+            (0..width).map(beyond).collect()
         };
         let moved = reference != self.reference;
         let before = std::mem::replace(&mut self.reference, reference);
@@ -354,15 +397,6 @@ impl Archive {
                     |end: &[f64]| -> f64 { end.iter().zip(row).map(|(end, x)| (end - x).max(0.0)).product() };
                 share.least = (share.least - (room(&before) - room(&nearer))).max(0.0);
                 share.exact = false;
-            }
-        }
-        let new = came.then(|| self.len() - 1);
-        for (i, most) in self.touched(change, new) {
-            let share = &mut self.shares[i];
-            share.exact = false;
-            if came {
-                // What a newcomer takes, they dominate both.
-                share.least = (share.least - most).max(0.0);
             }
         }
     }

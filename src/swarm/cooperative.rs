@@ -102,7 +102,8 @@ impl Group {
             let own = &self.best_position[self.particles.row(particle)];
             let when = (share, self.turns);
             self.particles
-                .pull(particle, (own, leader), settings, when, self.random);
+                .one(particle)
+                .pull((own, leader), settings, when, self.random);
         }
         self.turns += 1;
     }

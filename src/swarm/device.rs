@@ -9,7 +9,7 @@ use super::checkpoint::Checkpoint;
 use super::mopso::blocks::Generation;
 use super::mopso::earnings::Earnings;
 use super::mopso::filter::{Point, front};
-use super::mopso::large_swarm::{empty_archive, leaders, learn_from, take_in};
+use super::mopso::large_swarm::{empty_archive, leaders, take_in};
 use super::mopso::thinning::{PER_PLACE, thinned};
 use super::settings::MopsoSettings;
 use super::space::Space;
@@ -17,24 +17,37 @@ use super::{Counters, Front, Progress};
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{swarm, swarm_gather};
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
-use crate::evaluate::resident::groups;
+use crate::evaluate::resident::{groups, sliced_groups};
 use crate::evaluate::{BackendInfo, Failure, FailureCounts, Problem};
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
 pub use crate::evaluate::resident::{BLOCK, DeviceObjectives};
 
-/// Particles whose own front stands in for the archive in the first generation.
-const SAMPLE: usize = 64 * BLOCK;
-/// The most points of it.
-const SAMPLE_FRONT: usize = 512;
 /// Failures that are told apart.
 const REASONS: usize = 15;
+/// Particles that may enter an archive which are read back unasked, with their positions.
+const AT_ONCE: usize = 512;
+/// Of more particles that may enter an archive than this, a card leaves out those that the first of them dominate before they are read.
+const TOO_MANY: usize = 8192;
 /// Bytes before the points of the list of those found: their number, and the failures by reason.
 const HEADER: u64 = 4 * (1 + REASONS as u64);
 const _: () = assert!(Failure::WORDS.len() <= REASONS && HEADER.is_multiple_of(16));
+
+/// The points of a list of those found, as far as it goes.
+fn points_of(list: &[u32], count: usize) -> Vec<Point> {
+    let of = |word: u32| f64::from(f32::from_bits(word));
+    let points = list[HEADER as usize / 4..].chunks_exact(4).take(count);
+    points
+        .map(|p| Point {
+            at: [of(p[1]), of(p[2]), of(p[3])],
+            who: p[0],
+        })
+        .collect()
+}
 
 /// `n` rows of `width` out of blocks.
 fn row_major(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
@@ -61,8 +74,28 @@ impl Checkpoint for DeviceState {
     const KIND: &'static str = "swarm of a device";
 }
 
+/// The particles that may enter the archive.
+struct Noted {
+    count: usize,
+    /// The first of them, [`AT_ONCE`] at the most.
+    points: Vec<Point>,
+    /// Their positions.
+    rows: Vec<f32>,
+    /// Particles that have failed, by reason, if bests have learnt along with it.
+    failures: FailureCounts,
+}
+
+/// Those that may enter the archive, none of which another dominates.
+struct Newcomers {
+    points: Vec<Point>,
+    /// Their positions.
+    rows: Vec<f32>,
+    failures: FailureCounts,
+}
+
 struct Kernels {
     learn: Arc<Kernel>,
+    note: Arc<Kernel>,
     advance: Arc<Kernel>,
     gather: Arc<Kernel>,
 }
@@ -79,7 +112,6 @@ struct Buffers {
     /// As large as the largest of what is read back.
     readback: wgpu::Buffer,
     gathering: wgpu::Buffer,
-    chosen: wgpu::Buffer,
     rows: wgpu::Buffer,
     swarm: wgpu::BindGroup,
     gather: wgpu::BindGroup,
@@ -148,16 +180,17 @@ impl DeviceMopso {
         let scatter = kernel("scatter")?;
         let kernels = Kernels {
             learn: kernel("learn")?,
+            note: kernel("note")?,
             advance: kernel("advance")?,
             gather: context.kernel(&swarm_gather(), "gather", &[Uniform, Read, Read, Write])?,
         };
         let n = settings.motion.population;
         let lanes = n.next_multiple_of(BLOCK) as u64;
         let (state, worth) = (lanes * d as u64 * 4, lanes * width as u64 * 4);
-        let members = settings.archive.max(SAMPLE_FRONT) as u64;
+        let members = (settings.archive + AT_ONCE) as u64;
         let most = PER_PLACE * settings.archive;
         let listed = HEADER + lanes * 16;
-        let largest = state.max(listed);
+        let largest = state.max(listed + (AT_ONCE * d * 4) as u64);
         let room = most_particles(&context, d);
         if n > room {
             let found = n.to_string();
@@ -175,7 +208,7 @@ impl DeviceMopso {
         let on = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
         let size = size_of::<Generation>() as u64;
         let generation = context.buffer("generation", size, Usage::UNIFORM | Usage::COPY_DST)?;
-        let leaders = context.buffer("archive", members * (d as u64 + 3) * 4, on)?;
+        let leaders = context.buffer("archive", members * d.max(3) as u64 * 4, on)?;
         let position = context.buffer("positions", state, on)?;
         let velocity = context.buffer("velocities", state, on)?;
         let best_position = context.buffer("best positions", state, on)?;
@@ -184,8 +217,7 @@ impl DeviceMopso {
         let found = context.buffer("candidates", listed, on)?;
         let readback = context.buffer("readback", largest, Usage::MAP_READ | Usage::COPY_DST)?;
         let gathering = context.buffer("gathering", 16, Usage::UNIFORM | Usage::COPY_DST)?;
-        let chosen = context.buffer("chosen", most as u64 * 4, on)?;
-        let rows = context.buffer("chosen positions", (most * d) as u64 * 4, on)?;
+        let rows = context.buffer("chosen positions", (most.max(AT_ONCE) * d) as u64 * 4, on)?;
         let state = [
             &generation,
             &leaders,
@@ -197,7 +229,7 @@ impl DeviceMopso {
             &found,
         ];
         let swarm = context.bind(&scatter, &state)?;
-        let gather = context.bind(&kernels.gather, &[&gathering, &chosen, &position, &rows])?;
+        let gather = context.bind(&kernels.gather, &[&gathering, &found, &position, &rows])?;
         let buffers = Buffers {
             generation,
             archive: leaders,
@@ -209,7 +241,6 @@ impl DeviceMopso {
             found,
             readback,
             gathering,
-            chosen,
             rows,
             swarm,
             gather,
@@ -329,10 +360,15 @@ impl DeviceMopso {
     /// Records a kernel of the swarm, a lane to a particle.
     fn record(&self, encoder: &mut wgpu::CommandEncoder, kernel: &Kernel) {
         let (x, y) = groups(self.settings.motion.population);
+        self.record_groups(encoder, kernel, [x, y, 1]);
+    }
+
+    /// Records a kernel of the swarm with so many workgroups.
+    fn record_groups(&self, encoder: &mut wgpu::CommandEncoder, kernel: &Kernel, [x, y, z]: [u32; 3]) {
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &self.buffers.swarm, &[]);
-        pass.dispatch_workgroups(x, y, 1);
+        pass.dispatch_workgroups(x, y, z);
     }
 
     /// Runs a kernel of the swarm for the present iteration against so many members.
@@ -348,45 +384,108 @@ impl DeviceMopso {
             .read_back((from, 0), readback, bytes, bytemuck::pod_collect_to_vec)
     }
 
-    /// The front of the first particles, used while the archive is empty.
-    fn sample(&self) -> Result<Vec<Point>> {
-        let width = self.objectives;
-        let n = self.settings.motion.population.min(SAMPLE);
-        let lanes = n.next_multiple_of(BLOCK);
-        let rows: Vec<f32> = self.read(&self.buffers.objectives, (lanes * width * 4) as u64)?;
-        let plain = row_major(&rows, n, width);
-        Ok(thinned(learn_from(&plain, width), width, SAMPLE_FRONT, None))
-    }
-
-    /// Lets personal bests learn against so many members of the archive; the particles that may enter it, and those that have failed by
-    /// reason.
-    fn learn(&self, members: usize) -> Result<(Vec<Point>, FailureCounts)> {
-        let Buffers { found, readback, .. } = &self.buffers;
+    /// Notes the particles that may enter the archive beside so many members, once personal bests have learnt if they are to.
+    fn note(&self, members: &[[f64; 3]], learns: bool) -> Result<Noted> {
+        let Buffers {
+            archive,
+            found,
+            rows,
+            readback,
+            ..
+        } = &self.buffers;
+        let table: Vec<f32> = members.iter().flatten().map(|x| *x as f32).collect();
+        self.context.write(archive, bytemuck::cast_slice(&table));
         self.context.write(found, &[0; HEADER as usize]);
-        self.announce(members);
-        let counts: Vec<u32> = self.context.run_and_read_back(
-            |encoder| self.record(encoder, &self.kernels.learn),
-            (found, 0),
-            (readback, HEADER),
+        self.announce(members.len());
+        let n = self.settings.motion.population;
+        let most = n.min(AT_ONCE);
+        self.announce_gathering(most);
+        let head = HEADER + 16 * most as u64;
+        let row_bytes = (most * self.space.dimensions() * 4) as u64;
+        let words: Vec<u32> = self.context.run_and_read_back(
+            |encoder| {
+                if learns {
+                    self.record(encoder, &self.kernels.learn);
+                }
+                self.record(encoder, &self.kernels.note);
+                self.record_gather(encoder, most);
+            },
+            &[(found, 0..head), (rows, 0..row_bytes)],
+            readback,
             bytemuck::pod_collect_to_vec,
         )?;
+        let (list, rows) = words.split_at(head as usize / 4);
+        let count = (list[0] as usize).min(n);
         let failures = Failure::WORDS
             .iter()
-            .zip(&counts[1..])
+            .zip(&list[1..])
             .filter(|(_, count)| **count > 0)
-            .map(|(word, count)| ((*word).to_owned(), u64::from(*count)))
-            .collect();
-        let count = u64::from(counts[0]).min(self.settings.motion.population as u64);
-        if count == 0 {
-            return Ok((Vec::new(), failures));
+            .map(|(word, count)| ((*word).to_owned(), u64::from(*count)));
+        Ok(Noted {
+            count,
+            points: points_of(list, count),
+            rows: rows.iter().map(|word| f32::from_bits(*word)).collect(),
+            failures: failures.collect(),
+        })
+    }
+
+    /// Lets personal bests learn.
+    fn learn(&self) -> Result<Newcomers> {
+        let (d, width) = (self.space.dimensions(), self.objectives);
+        let at = |row: &Vec<f64>| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0));
+        let mut members: Vec<[f64; 3]> = self.archive.objectives.iter().map(at).collect();
+        let mut noted = self.note(&members, true)?;
+        let failures = std::mem::take(&mut noted.failures);
+        let mut sample = Vec::new();
+        if noted.count > TOO_MANY && self.context.is_shaped_for_a_card() {
+            sample = front(noted.points, width);
+            members.extend(sample.iter().map(|p| p.at));
+            noted = self.note(&members, false)?;
         }
-        let words: Vec<u32> = self.read(&self.buffers.found, HEADER + 16 * count)?;
-        let of = |word: u32| f64::from(f32::from_bits(word));
-        let points = words[HEADER as usize / 4..].chunks_exact(4).map(|p| Point {
-            at: [of(p[1]), of(p[2]), of(p[3])],
-            who: p[0],
-        });
-        Ok((points.collect(), failures))
+        let mut place = None;
+        if noted.count > noted.points.len() {
+            let words: Vec<u32> = self.read(&self.buffers.found, HEADER + 16 * noted.count as u64)?;
+            noted.points = points_of(&words, noted.count);
+        } else if sample.is_empty() {
+            let places: HashMap<u32, usize> = noted.points.iter().map(|p| p.who).zip(0..).collect();
+            place = Some(places);
+        }
+        // They were among the members, so that the list leaves them out.
+        noted.points.extend(sample);
+        let points = thinned(
+            front(noted.points, width),
+            width,
+            PER_PLACE * self.settings.archive,
+            self.archive.fixed_reference(),
+        );
+        let rows = match place {
+            Some(place) => {
+                let row = |p: &Point| &noted.rows[place[&p.who] * d..][..d];
+                points.iter().flat_map(row).copied().collect()
+            }
+            None => self.gather(&points)?,
+        };
+        Ok(Newcomers {
+            points,
+            rows,
+            failures,
+        })
+    }
+
+    /// Tells the kernel that gathers positions how many particles it takes at the most.
+    fn announce_gathering(&self, most: usize) {
+        let figures = [most as u32, self.space.dimensions() as u32, 0, 0];
+        self.context
+            .write(&self.buffers.gathering, bytemuck::cast_slice(&figures));
+    }
+
+    /// Records it.
+    fn record_gather(&self, encoder: &mut wgpu::CommandEncoder, most: usize) {
+        let (x, y) = groups(most * self.space.dimensions());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&self.kernels.gather.pipeline);
+        pass.set_bind_group(0, &self.buffers.gather, &[]);
+        pass.dispatch_workgroups(x, y, 1);
     }
 
     /// Positions of these particles.
@@ -394,23 +493,17 @@ impl DeviceMopso {
         if points.is_empty() {
             return Ok(Vec::new());
         }
-        let d = self.space.dimensions();
-        let who: Vec<u32> = points.iter().map(|p| p.who).collect();
-        self.context.write(
-            &self.buffers.gathering,
-            bytemuck::cast_slice(&[points.len() as u32, d as u32, 0, 0]),
-        );
+        let mut list = vec![0u32; HEADER as usize / 4];
+        list[0] = points.len() as u32;
+        list.extend(points.iter().flat_map(|p| [p.who, 0, 0, 0]));
         self.context
-            .write(&self.buffers.chosen, bytemuck::cast_slice(&who));
+            .write(&self.buffers.found, bytemuck::cast_slice(&list));
+        self.announce_gathering(points.len());
+        let bytes = (points.len() * self.space.dimensions() * 4) as u64;
         self.context.run_and_read_back(
-            |encoder| {
-                let mut pass = encoder.begin_compute_pass(&Default::default());
-                pass.set_pipeline(&self.kernels.gather.pipeline);
-                pass.set_bind_group(0, &self.buffers.gather, &[]);
-                pass.dispatch_workgroups((points.len() as u32).div_ceil(64), 1, 1);
-            },
-            (&self.buffers.rows, 0),
-            (&self.buffers.readback, (points.len() * d * 4) as u64),
+            |encoder| self.record_gather(encoder, points.len()),
+            &[(&self.buffers.rows, 0..bytes)],
+            &self.buffers.readback,
             bytemuck::pod_collect_to_vec,
         )
     }
@@ -440,34 +533,15 @@ impl DeviceMopso {
     /// [`Error::Device`] if the device fails.
     pub fn learn_and_move(&mut self) -> Result<Progress> {
         let d = self.space.dimensions();
-        let sample = if self.archive.is_empty() {
-            self.sample()?
-        } else {
-            Vec::new()
-        };
-        let members: Vec<[f64; 3]> = if self.archive.is_empty() {
-            sample.iter().map(|p| p.at).collect()
-        } else {
-            let at = |row: &Vec<f64>| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0));
-            self.archive.objectives.iter().map(at).collect()
-        };
-        let mut table = vec![0.0f32; members.len() * d];
-        table.extend(members.iter().flatten().map(|x| *x as f32));
-        self.context
-            .write(&self.buffers.archive, bytemuck::cast_slice(&table));
-        let (mut points, failures) = self.learn(members.len())?;
-        // They were among the members, so that the list leaves them out.
-        points.extend(sample);
-        let points = thinned(
-            front(points, self.objectives),
-            self.objectives,
-            PER_PLACE * self.settings.archive,
-            self.archive.fixed_reference(),
-        );
-        let rows = self.gather(&points)?;
+        let members = self.archive.len();
+        let Newcomers {
+            points,
+            rows,
+            failures,
+        } = self.learn()?;
         let position = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect();
         let solutions = points.into_iter().zip(rows.chunks_exact(d).map(position));
-        let generation = self.generation(members.len());
+        let generation = self.generation(members);
         let solutions = solutions.collect();
         take_in(&mut self.archive, &mut self.earnings, &generation, solutions, 0.0);
         self.counters.told(self.settings.motion.population);
@@ -476,8 +550,9 @@ impl DeviceMopso {
             .write(&self.buffers.archive, bytemuck::cast_slice(&leaders));
         // The host goes on meanwhile: the evaluation that follows waits for it.
         self.announce(self.archive.len());
+        let groups = sliced_groups(&self.context, self.settings.motion.population, d);
         self.context
-            .run_ahead(|encoder| self.record(encoder, &self.kernels.advance))?;
+            .run_ahead(|encoder| self.record_groups(encoder, &self.kernels.advance, groups))?;
         Ok(Progress {
             iteration: self.counters.iteration,
             evaluations: self.counters.evaluations,

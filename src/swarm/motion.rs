@@ -6,6 +6,7 @@ use super::space::Space;
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -79,53 +80,6 @@ impl Particles {
         self.space.scaled(&self.position, self.count)
     }
 
-    /// Moves one particle: inertia, a pull to its own best and a pull to its leader (equations 5.6-5.8 of the
-    /// thesis; \[1, 2\]), shortened as the settings say.
-    pub fn pull(
-        &mut self,
-        particle: usize,
-        (own, leader): (&[f64], &[f64]),
-        settings: &PsoSettings,
-        (share, iteration): (f64, usize),
-        random: Random,
-    ) {
-        let uniform = |purpose: Purpose, index: usize| {
-            random.uniform(purpose as u32, iteration as u32, particle as u32, index as u32)
-        };
-        let (w, c1, c2) = match settings.constriction {
-            Constriction::None => (
-                settings.inertia.at(share),
-                settings.cognitive.at(share),
-                settings.social.at(share),
-            ),
-            Constriction::Clerc => {
-                let (c1, c2) = (settings.cognitive.at(share), settings.social.at(share));
-                let chi = constriction(c1 + c2).abs();
-                (chi, chi * c1, chi * c2)
-            }
-            Constriction::Signed => {
-                let [least, most] = DRAWN_PULLS;
-                let [c1, c2] = [0, 1].map(|k| least + (most - least) * uniform(Purpose::Pulls, k));
-                let chi = constriction(c1 + c2);
-                (chi * settings.inertia.at(share), chi * c1, chi * c2)
-            }
-        };
-        for k in 0..self.dimensions() {
-            let index = match settings.randomness {
-                Randomness::PerDimension => k,
-                Randomness::PerParticle => 0,
-            };
-            let i = particle * self.dimensions() + k;
-            let x = self.position[i];
-            let velocity = w * self.velocity[i]
-                + c1 * uniform(Purpose::Cognitive, index) * (own[k] - x)
-                + c2 * uniform(Purpose::Social, index) * (leader[k] - x);
-            self.velocity[i] = velocity.clamp(-settings.speed_limit, settings.speed_limit);
-            self.position[i] = x + self.velocity[i];
-            self.confine(i, settings.bounds);
-        }
-    }
-
     /// Mutates one particle, or makes a trial beside it, at the share of the run and in the iteration.
     pub fn mutate(
         &mut self,
@@ -169,16 +123,93 @@ impl Particles {
         trials.position.extend(trial);
     }
 
-    /// Brings one coordinate back into the cube.
-    pub fn confine(&mut self, i: usize, handling: BoundHandling) {
-        let inside = self.position[i].clamp(0.0, 1.0);
-        if inside != self.position[i] {
-            self.position[i] = inside;
-            self.velocity[i] *= match handling {
+    /// A particle, to be moved.
+    pub fn one(&mut self, particle: usize) -> Particle<'_> {
+        let row = self.row(particle);
+        Particle {
+            number: particle,
+            position: &mut self.position[row.clone()],
+            velocity: &mut self.velocity[row],
+        }
+    }
+
+    /// All particles, to be moved in threads.
+    pub fn each(&mut self) -> impl IndexedParallelIterator<Item = Particle<'_>> {
+        let d = self.dimensions().max(1);
+        let rows = self
+            .position
+            .par_chunks_mut(d)
+            .zip(self.velocity.par_chunks_mut(d));
+        let each = rows.enumerate().map(|(number, (position, velocity))| Particle {
+            number,
+            position,
+            velocity,
+        });
+        each.with_min_len((MOVED_TOGETHER / d).max(1))
+    }
+}
+
+/// Coordinates that a thread moves in a row: fewer take no longer than to share them out.
+const MOVED_TOGETHER: usize = 4096;
+
+/// One particle.
+pub(super) struct Particle<'a> {
+    pub number: usize,
+    pub position: &'a mut [f64],
+    pub velocity: &'a mut [f64],
+}
+
+impl Particle<'_> {
+    /// Moves it: inertia, a pull to its own best and a pull to its leader (equations 5.6-5.8 of the
+    /// thesis; \[1, 2\]), shortened as the settings say.
+    pub fn pull(
+        &mut self,
+        (own, leader): (&[f64], &[f64]),
+        settings: &PsoSettings,
+        (share, iteration): (f64, usize),
+        random: Random,
+    ) {
+        let uniform = |purpose: Purpose, index: usize| {
+            random.uniform(purpose as u32, iteration as u32, self.number as u32, index as u32)
+        };
+        let (w, c1, c2) = match settings.constriction {
+            Constriction::None => (
+                settings.inertia.at(share),
+                settings.cognitive.at(share),
+                settings.social.at(share),
+            ),
+            Constriction::Clerc => {
+                let (c1, c2) = (settings.cognitive.at(share), settings.social.at(share));
+                let chi = constriction(c1 + c2).abs();
+                (chi, chi * c1, chi * c2)
+            }
+            Constriction::Signed => {
+                let [least, most] = DRAWN_PULLS;
+                let [c1, c2] = [0, 1].map(|k| least + (most - least) * uniform(Purpose::Pulls, k));
+                let chi = constriction(c1 + c2);
+                (chi * settings.inertia.at(share), chi * c1, chi * c2)
+            }
+        };
+        for k in 0..self.position.len() {
+            let index = match settings.randomness {
+                Randomness::PerDimension => k,
+                Randomness::PerParticle => 0,
+            };
+            let x = self.position[k];
+            let velocity = w * self.velocity[k]
+                + c1 * uniform(Purpose::Cognitive, index) * (own[k] - x)
+                + c2 * uniform(Purpose::Social, index) * (leader[k] - x);
+            let velocity = velocity.clamp(-settings.speed_limit, settings.speed_limit);
+            let moved = x + velocity;
+            let inside = moved.clamp(0.0, 1.0);
+            let kept = match settings.bounds {
+                _ if inside == moved => 1.0,
                 BoundHandling::Absorb => 0.0,
                 BoundHandling::Bounce => -0.5,
                 BoundHandling::Reverse => -1.0,
             };
+            self.velocity[k] = velocity * kept;
+            self.position[k] = inside;
         }
     }
 }

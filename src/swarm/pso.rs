@@ -1,13 +1,14 @@
 //! Single-objective particle swarm.
 
 use super::checkpoint::to_bytes;
-use super::motion::{Particles, Purpose, Trials};
+use super::motion::{Particle, Particles, Purpose, Trials};
 use super::settings::PsoSettings;
 use super::space::Space;
 use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem, Worth};
 use crate::random::Random;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A swarm with one leader (references 1, 2 and 7 of [`super`]).
@@ -55,80 +56,71 @@ impl Pso {
     }
 
     fn advance(&mut self) {
-        let share = self.counters.iteration as f64 / (self.settings.iterations.max(2) - 1) as f64;
-        let d = self.particles.dimensions();
+        let iteration = self.counters.iteration;
+        let share = iteration as f64 / (self.settings.iterations.max(2) - 1) as f64;
         let mut order: Vec<usize> = (0..self.settings.population).collect();
         order.sort_by(|&a, &b| self.best[a].order(&self.best[b]));
         let elite = ((self.settings.population as f64 * ELITE_SHARE) as usize).max(2);
-        for particle in 0..self.settings.population {
-            let coin = self.random.uniform(
-                Purpose::Coin as u32,
-                self.counters.iteration as u32,
-                particle as u32,
-                0,
-            );
-            if coin < self.settings.difference_share {
-                self.difference_move(particle, &order[..elite.min(order.len())]);
+        let elite = &order[..elite.min(order.len())];
+        let (settings, random) = (&self.settings, self.random);
+        let (bests, leader) = (&self.best_position, self.leader);
+        // No particle's move changes another's.
+        self.particles.each().for_each(|mut particle| {
+            let (when, who) = (iteration as u32, particle.number as u32);
+            let coin = random.uniform(Purpose::Coin as u32, when, who, 0);
+            if coin < settings.difference_share {
+                difference_move(&mut particle, (bests, elite), settings.population, random, when);
             } else {
-                let own = self.best_position[particle * d..(particle + 1) * d].to_vec();
-                let leader = self.best_position[self.leader * d..(self.leader + 1) * d].to_vec();
-                self.particles.pull(
-                    particle,
-                    (&own, &leader),
-                    &self.settings,
-                    (share, self.counters.iteration),
-                    self.random,
-                );
+                let d = particle.position.len();
+                let best = |p: usize| &bests[p * d..(p + 1) * d];
+                let towards = (best(particle.number), best(leader));
+                particle.pull(towards, settings, (share, iteration), random);
             }
-            let now = (share, self.counters.iteration);
-            self.particles.mutate(
-                particle,
-                self.settings.mutation,
-                now,
-                self.random,
-                &mut self.trials,
-            );
+        });
+        for particle in 0..settings.population {
+            let mutation = settings.mutation;
+            self.particles
+                .mutate(particle, mutation, (share, iteration), random, &mut self.trials);
         }
     }
+}
 
-    /// From a particle's own best towards one of the elite, plus the difference of two others' bests; only some
-    /// coordinates move, so that what is good already is not all given up at once.
-    fn difference_move(&mut self, particle: usize, elite: &[usize]) {
-        let (when, who) = (self.counters.iteration as u32, particle as u32);
-        let purpose = Purpose::Difference as u32;
-        let d = self.particles.dimensions();
-        let uniform = |index: u32| self.random.uniform(purpose, when, who, index);
-        let pick = |index: u32| {
-            self.random
-                .below(self.settings.population, purpose, when, who, index)
+/// From a particle's own best towards one of the elite, plus the difference of two others' bests; only some coordinates move, so that
+/// what is good already is not all given up at once.
+fn difference_move(
+    particle: &mut Particle<'_>,
+    (bests, elite): (&[f64], &[usize]),
+    population: usize,
+    random: Random,
+    when: u32,
+) {
+    let who = particle.number as u32;
+    let purpose = Purpose::Difference as u32;
+    let d = particle.position.len();
+    let uniform = |index: u32| random.uniform(purpose, when, who, index);
+    let pick = |index: u32| random.below(population, purpose, when, who, index);
+    let towards = elite[random.below(elite.len(), purpose, when, who, 0)];
+    let (first, second) = (pick(1), pick(2));
+    let scale = 0.4 + 0.5 * uniform(3);
+    let crossover = if uniform(4) < 0.5 { 0.9 } else { 0.3 };
+    let always = random.below(d, purpose, when, who, 5);
+    for k in 0..d {
+        let at = |p: usize| bests[p * d + k];
+        let own = at(particle.number);
+        let moved = own + scale * (at(towards) - own) + scale * (at(first) - at(second));
+        let take = k == always || uniform(8 + k as u32) < crossover;
+        // Half-way back to the bound that was overstepped, which keeps the spread of the swarm.
+        let target = if !take {
+            own
+        } else if moved < 0.0 {
+            0.5 * own
+        } else if moved > 1.0 {
+            0.5 * (own + 1.0)
+        } else {
+            moved
         };
-        let towards = elite[self.random.below(elite.len(), purpose, when, who, 0)];
-        let (first, second) = (pick(1), pick(2));
-        let scale = 0.4 + 0.5 * uniform(3);
-        let crossover = if uniform(4) < 0.5 { 0.9 } else { 0.3 };
-        if d == 0 {
-            return;
-        }
-        let always = self.random.below(d, purpose, when, who, 5);
-        for k in 0..d {
-            let i = particle * d + k;
-            let at = |p: usize| self.best_position[p * d + k];
-            let own = at(particle);
-            let moved = own + scale * (at(towards) - own) + scale * (at(first) - at(second));
-            let take = k == always || uniform(8 + k as u32) < crossover;
-            // Half-way back to the bound that was overstepped, which keeps the spread of the swarm.
-            let target = if !take {
-                own
-            } else if moved < 0.0 {
-                0.5 * own
-            } else if moved > 1.0 {
-                0.5 * (own + 1.0)
-            } else {
-                moved
-            };
-            self.particles.velocity[i] = target - self.particles.position[i];
-            self.particles.position[i] = target;
-        }
+        particle.velocity[k] = target - particle.position[k];
+        particle.position[k] = target;
     }
 }
 

@@ -118,7 +118,7 @@ pub fn kernels() -> Vec<KernelSource> {
             }
         }
     }
-    for entry in ["scatter", "learn", "advance"] {
+    for entry in ["scatter", "learn", "note", "advance"] {
         add(entry, "", swarm());
     }
     add("gather", "", swarm_gather());

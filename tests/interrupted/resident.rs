@@ -84,8 +84,10 @@ impl<S: Study> Trial<'_, S> {
                 faults::inject(Fault::Lost, from, 1);
                 ControlFlow::Continue(())
             });
-            assert_eq!(told(&struck).len(), 1, "a fault at {from}: {:?}", told(&struck));
-            assert_eq!(front(&struck), front(&clean), "a fault at {from}");
+            let told = told(&struck);
+            assert_eq!(told.len(), 1, "a fault at {from}: {told:?}");
+            assert_eq!(S::record(&struck).backend, "gpu", "a fault at {from}: {told:?}");
+            assert_eq!(front(&struck), front(&clean), "a fault at {from}: {told:?}");
             assert_eq!(S::record(&struck).failures, S::record(&clean).failures);
         }
 

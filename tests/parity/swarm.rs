@@ -1,7 +1,7 @@
 //! Random numbers, test problems and swarms: processor and device against each other.
 
 use crate::common::Random;
-use crate::device::{device, the_device};
+use crate::device::{device, devices, the_device};
 use lapswarm::Result;
 use lapswarm::evaluate::gpu::shader::{WheelOrder, elementary, random};
 use lapswarm::evaluate::gpu::{Binding, GpuContext, Kernel};
@@ -21,6 +21,7 @@ tests! {
     the_device_takes_the_same_powers: device,
     test_problems_are_the_same_everywhere: also_device,
     swarms_in_lanes_and_on_the_device_in_lockstep: device,
+    swarms_shaped_for_a_card_are_those_in_lanes: device,
     a_swarm_on_the_device_takes_costs_of_any_size: device,
     a_swarm_on_the_device_counts_what_is_beyond_single_precision: device,
     swarms_on_the_device_keep_the_knee_of_a_front_with_long_tails: device,
@@ -258,6 +259,35 @@ fn swarms_in_lanes_and_on_the_device_in_lockstep() {
             volume(&there.front().objectives),
         );
         assert!((here - there).abs() < 2e-3, "{name}: {here} and {there}");
+    }
+}
+
+/// Slices of coordinates, and so many particles that those that may enter the archive are told apart before they are read: with another
+/// shape a swarm has the same bits.
+fn swarms_shaped_for_a_card_are_those_in_lanes() {
+    let devices = devices();
+    for (name, variables) in [("zdt1", 37), ("dtlz2", 40)] {
+        let test = TestProblem::sized(name, variables).unwrap();
+        let settings = MopsoSettings::default().with_size(20_000, 5);
+        let swarm = |context: &Arc<GpuContext>| {
+            let mut swarm = DeviceMopso::new(test.problem(), settings.clone(), Arc::clone(context)).unwrap();
+            let mut judge = GpuTestEvaluator::new(&test, Arc::clone(context)).unwrap();
+            swarm
+                .run(&mut judge, |_| std::ops::ControlFlow::Continue(()))
+                .unwrap();
+            (swarm.candidates().unwrap(), swarm.front())
+        };
+        let found = swarm(&devices[0]);
+        assert!(found == swarm(&devices[1]), "{name}");
+        if rounds_like_the_processor(&devices[0]) {
+            let mut lanes = Mopso::new(test.problem(), settings.clone()).unwrap();
+            let mut judge = SimdTestEvaluator::new(&test, InstructionSet::best());
+            for _ in 0..5 {
+                let candidates = lanes.ask();
+                lanes.tell(&judge.evaluate(&candidates).unwrap()).unwrap();
+            }
+            assert!(found == (lanes.ask(), lanes.front()), "{name}");
+        }
     }
 }
 

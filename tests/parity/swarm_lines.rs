@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use crate::common::line::{circuit, gt_car, lines};
-use crate::device::the_device;
+use crate::device::{devices, the_device};
 use glam::DVec2;
 use lapswarm::evaluate::gpu::GpuContext;
 use lapswarm::evaluate::line::{GpuLineEvaluator, LineObjective, LineProblem};
@@ -106,18 +106,22 @@ fn a_swarm_of_one_objective_moves_on_the_device_as_in_lanes() {
 /// The device scales positions in `f32`: a control point is off by two spacings of a float beside one, 2.4e-7 of 12 m, which
 /// between cross-sections 12 m apart is 8e-8 1/m of curvatures of some 0.01, and less of all else: under 2e-5 of any objective.
 fn objectives_are_those_of_the_host() {
-    let context = the_device();
-    for objectives in [
+    let both = [
         &LineObjective::ALL[2..],
         &[LineObjective::LapTime, LineObjective::Length],
-    ] {
+    ];
+    let devices = devices();
+    for (context, objectives) in devices
+        .iter()
+        .flat_map(|context| both.map(|objectives| (context, objectives)))
+    {
         let line = problem(objectives);
-        let mut judge = GpuLineEvaluator::new(&line, Arc::clone(&context)).unwrap();
+        let mut judge = GpuLineEvaluator::new(&line, Arc::clone(context)).unwrap();
         let few = judge.batching();
         let mut judges = [
-            GpuLineEvaluator::new(&line, Arc::clone(&context)).unwrap(),
+            GpuLineEvaluator::new(&line, Arc::clone(context)).unwrap(),
             // Several batches, and several dispatches to each.
-            GpuLineEvaluator::new(&line, Arc::clone(&context))
+            GpuLineEvaluator::new(&line, Arc::clone(context))
                 .unwrap()
                 .with_batching(lapswarm::evaluate::line::LineBatching {
                     bytes: 1 << 20,
@@ -125,7 +129,7 @@ fn objectives_are_those_of_the_host() {
                     ..few
                 }),
         ];
-        let mut swarm = swarm(&line, &context);
+        let mut swarm = swarm(&line, context);
         let expected = judge.evaluate(&swarm.candidates().unwrap()).unwrap().objectives;
         let asked: Vec<f64> = start(&line).concat();
         let given = swarm.candidates().unwrap();

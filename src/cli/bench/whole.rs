@@ -13,7 +13,13 @@ use lapswarm::swarm::device::DeviceMopso;
 use lapswarm::swarm::{Mopso, MopsoSettings, Optimiser};
 use lapswarm::{Error, Result};
 use serde::Serialize;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// How long generations are run before they are measured, and how long they are measured at the least: a card at rest takes a tenth of
+/// a second to get up to speed.
+const LEAST: Duration = Duration::from_millis(250);
+/// The most of them, unless more are asked for.
+const MOST: u32 = 500;
 
 /// Flags of `bench whole`.
 #[derive(clap::Args)]
@@ -26,7 +32,7 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',', default_value = "1000,10000,100000,1000000",
           value_parser = clap::value_parser!(u32).range(8..=4_194_304))]
     populations: Vec<u32>,
-    /// Generations that are measured, after one that compiles kernels and fills caches
+    /// Generations that are measured at the least, after others that compile kernels, fill caches and bring a card up to speed
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     generations: u32,
     /// Leave out generations that would take longer than this, s, by the rate of the population before
@@ -136,7 +142,6 @@ impl Bench for Generations<'_> {
                     let settings = arguments.settings(population);
                     let mut swarm = DeviceMopso::new(problem, settings, context.clone())?;
                     swarm.start_from(&starts(case, population))?;
-                    swarm.step(&mut evaluator)?;
                     arguments.timed(|| {
                         let before = context.dispatched_ms();
                         swarm.evaluate(&mut evaluator)?;
@@ -194,17 +199,22 @@ impl Generations<'_> {
 impl Arguments {
     /// Means over the generations, ms: of a generation, and of its kernels, whose time `generation` returns.
     fn timed(&self, mut generation: impl FnMut() -> Result<f64>) -> Result<[f64; 2]> {
-        let began = Instant::now();
-        let mut kernels = 0.0;
-        for _ in 0..self.generations {
-            kernels += generation()?;
-        }
-        let each = 1.0 / f64::from(self.generations);
-        Ok([began.elapsed().as_secs_f64() * 1e3 * each, kernels * each])
+        let mut run = |least: u32| -> Result<[f64; 2]> {
+            let began = Instant::now();
+            let (mut kernels, mut count) = (0.0, 0);
+            while count < least || (count < MOST && began.elapsed() < LEAST) {
+                kernels += generation()?;
+                count += 1;
+            }
+            let each = 1.0 / f64::from(count);
+            Ok([began.elapsed().as_secs_f64() * 1e3 * each, kernels * each])
+        };
+        run(1)?;
+        run(self.generations)
     }
 
     fn settings(&self, population: usize) -> MopsoSettings {
-        MopsoSettings::default().with_size(population, self.generations as usize + 1)
+        MopsoSettings::default().with_size(population, (2 * MOST.max(self.generations)) as usize)
     }
 
     /// The swarm asked and told on the host.
@@ -216,14 +226,12 @@ impl Arguments {
     ) -> Result<[f64; 2]> {
         let mut swarm = Mopso::new(case.kind.problem(), self.settings(population))?;
         swarm.start_from(&starts(case, population))?;
-        let mut generation = || {
+        self.timed(|| {
             let candidates = swarm.ask();
             let evaluation = evaluator.evaluate(&candidates)?;
             swarm.tell(&evaluation)?;
             Ok(evaluator.last_kernel_ms().unwrap_or(0.0))
-        };
-        generation()?;
-        self.timed(generation)
+        })
     }
 }
 

@@ -7,7 +7,8 @@ use crate::drive::kernel::{DrivenLap, STATE, ending};
 use crate::error::Result;
 use crate::evaluate::gpu::shader::{CarShape, DriveShape};
 use crate::evaluate::gpu::{
-    Batching, Binding, GpuContext, Trajectories, TrajectoryKernel, rounds_of, workgroup,
+    Batching, Binding, FigurePlanes, GpuContext, Trajectories, TrajectoryKernel, made_ahead, rounds_of,
+    workgroup,
 };
 use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
@@ -21,29 +22,10 @@ pub struct DriveDevice {
     trajectories: Trajectories<STATE>,
 }
 
-impl DriveDevice {
-    /// Puts the figures of a batch on the device.
-    fn load(&mut self, drive: &DriveProblem, batch: &[&[f64]]) -> Result<()> {
-        let rows = self.table.rows(&drive.free, batch);
-        self.trajectories
-            .load(batch.len(), &rows, |lane| drive.lap_figures(batch[lane]))
-    }
-
-    /// The last states of one batch, once the last lap has ended.
-    fn driven(&mut self, drive: &DriveProblem, batch: &[&[f64]]) -> Result<Vec<[f32; STATE]>> {
-        self.load(drive, batch)?;
-        let mut done = 0;
-        loop {
-            done += self.trajectories.go_on(batch.len(), done, usize::MAX)?;
-            // How a lap ended is the last figure of its state.
-            let under_way = self.trajectories.last_figures(batch.len(), |endings| {
-                endings.iter().any(|x| f64::from(*x) == ending::UNDER_WAY)
-            })?;
-            if !under_way {
-                return self.trajectories.states(batch.len());
-            }
-        }
-    }
+/// The figures of a batch.
+fn figures_of(drive: &DriveProblem, table: &ModelTable, planes: FigurePlanes, batch: &[&[f64]]) -> Vec<f32> {
+    let rows = table.rows(&drive.free, batch);
+    planes.of(batch.len(), &rows, |lane| drive.lap_figures(batch[lane]))
 }
 
 /// Drives laps on a graphics processor.
@@ -120,11 +102,28 @@ impl DeviceKernel<DriveProblem> for DriveDevice {
 
     fn outcomes(&mut self, drive: &DriveProblem, candidates: &[&[f64]]) -> Result<Vec<DrivenLap>> {
         self.trajectories.count_anew();
+        let Self { table, trajectories } = self;
         let mut laps = Vec::with_capacity(candidates.len());
-        for batch in candidates.chunks(self.trajectories.batch_size()) {
-            let states = self.driven(drive, batch)?.into_par_iter();
+        let planes = trajectories.figures();
+        let figures = |batch: &[&[f64]]| figures_of(drive, table, planes, batch);
+        let batches = candidates.chunks(trajectories.batch_size());
+        made_ahead(batches, figures, |batch, figures| {
+            trajectories.load(batch.len(), &figures)?;
+            let mut done = 0;
+            loop {
+                done += trajectories.go_on(batch.len(), done, usize::MAX)?;
+                // How a lap ended is the last figure of its state.
+                let under_way = trajectories.last_figures(batch.len(), |endings| {
+                    endings.iter().any(|x| f64::from(*x) == ending::UNDER_WAY)
+                })?;
+                if !under_way {
+                    break;
+                }
+            }
+            let states = trajectories.states(batch.len())?.into_par_iter();
             laps.par_extend(states.map(|s| drive.lap(s.map(f64::from))));
-        }
+            Ok(())
+        })?;
         Ok(laps)
     }
 }
@@ -146,8 +145,9 @@ impl GpuBackend<'_, DriveProblem> {
         states: &[[f32; STATE]],
         number: usize,
     ) -> Result<Vec<[f32; STATE]>> {
-        self.device.load(self.kind, candidates)?;
-        let trajectories = &mut self.device.trajectories;
+        let DriveDevice { table, trajectories } = &mut self.device;
+        let figures = figures_of(self.kind, table, trajectories.figures(), candidates);
+        trajectories.load(candidates.len(), &figures)?;
         trajectories.put(states)?;
         trajectories.dispatch(candidates.len(), number, 1)?;
         trajectories.states(candidates.len())

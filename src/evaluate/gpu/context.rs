@@ -16,6 +16,7 @@ use super::tuning::Tuning;
 use crate::error::{Error, Result};
 use crate::evaluate::{BackendInfo, dispatches};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -152,7 +153,7 @@ impl GpuContext {
         Ok(Arc::new(Self::open_within(name, |_| wgpu::Limits::default())?))
     }
 
-    /// A device of its own whose kernels go through wheels in that order, whatever kind it is.
+    /// A device of its own whose kernels go through wheels in that order, and whose swarms are shaped accordingly, whatever kind it is.
     ///
     /// # Errors
     /// As [`GpuContext::shared`].
@@ -229,6 +230,11 @@ impl GpuContext {
     /// How kernels go through the wheels of a car here.
     pub fn wheels(&self) -> WheelOrder {
         self.wheels
+    }
+
+    /// Whether work is shaped for a graphics processor, which only many lanes fill, instead of a software driver.
+    pub(crate) fn is_shaped_for_a_card(&self) -> bool {
+        self.wheels == WheelOrder::ByAxle
     }
 
     /// How kernels of lines and cars are dispatched here.
@@ -544,23 +550,30 @@ impl GpuContext {
         bytes: u64,
         read: impl FnOnce(&[u8]) -> T,
     ) -> Result<T> {
-        self.run_and_read_back(|_| (), from, (readback, bytes), read)
+        let (buffer, first) = from;
+        let from = [(buffer, first..first + bytes)];
+        self.run_and_read_back(|_| (), &from, readback, read)
     }
 
-    /// The same after what `record` records, in one submission.
+    /// The same of several pieces of buffers one after the other, after what `record` records, in one submission.
     ///
     /// # Errors
     /// [`Error::Device`] if that fails or takes too long.
     pub(crate) fn run_and_read_back<T>(
         &self,
         record: impl FnOnce(&mut wgpu::CommandEncoder),
-        (from, first): (&wgpu::Buffer, u64),
-        (readback, bytes): (&wgpu::Buffer, u64),
+        pieces: &[(&wgpu::Buffer, Range<u64>)],
+        readback: &wgpu::Buffer,
         read: impl FnOnce(&[u8]) -> T,
     ) -> Result<T> {
+        let mut bytes = 0;
         self.run(|encoder| {
             record(encoder);
-            encoder.copy_buffer_to_buffer(from, first, readback, 0, bytes);
+            for (from, piece) in pieces {
+                let size = piece.end - piece.start;
+                encoder.copy_buffer_to_buffer(from, piece.start, readback, bytes, size);
+                bytes += size;
+            }
         })?;
         self.read(readback, bytes, read)
     }

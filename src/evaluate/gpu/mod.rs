@@ -25,10 +25,10 @@ pub use pacing::Batching;
 #[cfg(feature = "vehicle")]
 pub(crate) use pacing::{LOOP_ROUNDS, LanePacing, most_rounds, rounds_of};
 #[cfg(feature = "vehicle")]
-pub(in crate::evaluate) use planes::planes;
+pub(in crate::evaluate) use planes::{made_ahead, planes};
 pub use spread::Spread;
 #[cfg(feature = "vehicle")]
 pub use trajectories::TrajectoryStretch;
 #[cfg(feature = "vehicle")]
-pub(crate) use trajectories::{Trajectories, TrajectoryKernel, workgroup};
+pub(crate) use trajectories::{FigurePlanes, Trajectories, TrajectoryKernel, workgroup};
 pub use tuning::Tuning;

@@ -1,5 +1,6 @@
 //! Figures of candidates as kernels read them.
 
+use crate::error::Result;
 use rayon::prelude::*;
 
 /// Figures that a thread writes at a time: as many of a candidate as share a line of the processor's cache.
@@ -30,9 +31,45 @@ pub(in crate::evaluate) fn planes(
     all
 }
 
+/// Lets a device `work` on the figures that `make` makes of each batch, in their order. The figures of the next batch are made
+/// meanwhile.
+///
+/// # Errors
+/// The first of those of `work`.
+pub(in crate::evaluate) fn made_ahead<B: Copy + Send + Sync, F: Send>(
+    mut batches: impl Iterator<Item = B>,
+    make: impl Fn(B) -> F + Sync,
+    mut work: impl FnMut(B, F) -> Result<()> + Send,
+) -> Result<()> {
+    let made = |batch: B| (batch, make(batch));
+    let mut next = batches.next().map(made);
+    while let Some((batch, figures)) = next {
+        let following = batches.next();
+        let (worked, ready) = rayon::join(|| work(batch, figures), || following.map(made));
+        worked?;
+        next = ready;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::planes;
+    use super::{made_ahead, planes};
+    use crate::error::Error;
+
+    #[test]
+    fn batches_are_worked_on_in_order_until_one_fails() {
+        let mut seen = Vec::new();
+        let work = |batch: usize, figures: usize| {
+            seen.push((batch, figures));
+            match batch {
+                7 => Err(Error::Device("gone".to_owned())),
+                _ => Ok(()),
+            }
+        };
+        assert!(made_ahead(3..20, |batch| batch * batch, work).is_err());
+        assert_eq!(seen, [(3, 9), (4, 16), (5, 25), (6, 36), (7, 49)]);
+    }
 
     #[test]
     fn every_figure_of_every_candidate_has_its_place() {

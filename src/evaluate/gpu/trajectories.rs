@@ -50,8 +50,45 @@ pub(crate) struct TrajectoryKernel<'k> {
     pub rounds_per_step: usize,
 }
 
+/// How the figures of a batch lie on the device.
+#[derive(Clone, Copy)]
+pub(crate) struct FigurePlanes {
+    workgroup: usize,
+    /// Figures of a candidate: those of its car that vary and the others.
+    varying: usize,
+    all: usize,
+}
+
+impl FigurePlanes {
+    /// Distance between the planes of so many candidates.
+    fn stride(self, candidates: usize) -> usize {
+        candidates.next_multiple_of(self.workgroup)
+    }
+
+    /// The figures of candidates: the rows of their cars (see [`ModelTable::rows`]) and what `others` says of each.
+    pub fn of<const OTHERS: usize>(
+        self,
+        candidates: usize,
+        rows: &[f32],
+        others: impl Fn(usize) -> [f64; OTHERS] + Sync,
+    ) -> Vec<f32> {
+        let others: Vec<[f64; OTHERS]> = (0..candidates).into_par_iter().map(&others).collect();
+        let varying = self.varying;
+        planes(
+            [candidates, self.stride(candidates), self.all],
+            |lane, figure| match figure.checked_sub(varying) {
+                None => rows[lane * varying + figure],
+                Some(other) => others[lane][other] as f32,
+            },
+        )
+    }
+}
+
 /// Buffers that grow with the batch, and the kernel's bindings to them.
 struct BatchBuffers {
+    /// Candidates that fit.
+    room: usize,
+    /// Distance between the planes of the present batch.
     stride: usize,
     figures: wgpu::Buffer,
     progress: wgpu::Buffer,
@@ -64,10 +101,7 @@ pub(crate) struct Trajectories<const STATE: usize> {
     context: Arc<GpuContext>,
     kernel: Arc<Kernel>,
     batching: Batching,
-    workgroup: usize,
-    /// Figures of a candidate: those of its car that vary and the others.
-    varying: usize,
-    figures: usize,
+    figures: FigurePlanes,
     stretch: wgpu::Buffer,
     base: wgpu::Buffer,
     tables: Vec<wgpu::Buffer>,
@@ -93,6 +127,11 @@ impl<const STATE: usize> Trajectories<STATE> {
             Usage::UNIFORM | Usage::COPY_DST,
         )?;
         let varying = parts.table.varying.len();
+        let figures = FigurePlanes {
+            workgroup: workgroup(&context) as usize,
+            varying,
+            all: varying + parts.others,
+        };
         Ok(Self {
             // A step of all lanes takes milliseconds on a software driver, and fills a large card.
             batching: match context.summary().kind {
@@ -100,11 +139,9 @@ impl<const STATE: usize> Trajectories<STATE> {
                 kind => Batching::new(kind, context.tuning().lanes / 2, u64::MAX),
             },
             pacing: Pacing::new(parts.rounds_per_step, most_rounds(context.summary().kind)),
-            workgroup: workgroup(&context) as usize,
+            figures,
             context,
             kernel,
-            varying,
-            figures: varying + parts.others,
             stretch,
             base,
             tables,
@@ -143,23 +180,29 @@ impl<const STATE: usize> Trajectories<STATE> {
             .max_storage_buffer_binding_size
             .min(limits.max_buffer_size)
             .min(self.batching.bytes);
-        let planes = self.figures.max(STATE) as u64;
+        let planes = self.figures.all.max(STATE) as u64;
         let most_groups = limits.max_compute_workgroups_per_dimension as usize;
-        let lanes = self.batching.lanes.min((bytes / (4 * planes)) as usize) / self.workgroup;
-        lanes.clamp(1, most_groups) * self.workgroup
+        let workgroup = self.figures.workgroup;
+        let lanes = self.batching.lanes.min((bytes / (4 * planes)) as usize) / workgroup;
+        lanes.clamp(1, most_groups) * workgroup
     }
 
     /// Makes room for a batch of `candidates`.
     fn reserve(&mut self, candidates: usize) -> Result<()> {
-        let stride = candidates.next_multiple_of(self.workgroup);
-        if self.batch.as_ref().is_some_and(|b| b.stride >= stride) {
+        let stride = self.figures.stride(candidates);
+        if let Some(batch) = self.batch.as_mut().filter(|batch| batch.room >= stride) {
+            batch.stride = stride;
             return Ok(());
         }
         // The old buffers go before the new ones come.
         self.batch = None;
         let context = &self.context;
         let bytes = |planes: usize| (planes * stride * 4) as u64;
-        let figures = context.buffer("figures", bytes(self.figures), Usage::STORAGE | Usage::COPY_DST)?;
+        let figures = context.buffer(
+            "figures",
+            bytes(self.figures.all),
+            Usage::STORAGE | Usage::COPY_DST,
+        )?;
         let both_ways = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
         let progress = context.buffer("progress", bytes(STATE), both_ways)?;
         let readback = context.buffer("readback", bytes(STATE), Usage::MAP_READ | Usage::COPY_DST)?;
@@ -167,6 +210,7 @@ impl<const STATE: usize> Trajectories<STATE> {
         bound.extend(&self.tables);
         let group = context.bind(&self.kernel, &bound)?;
         self.batch = Some(BatchBuffers {
+            room: stride,
             stride,
             figures,
             progress,
@@ -182,29 +226,19 @@ impl<const STATE: usize> Trajectories<STATE> {
             .ok_or_else(|| Error::Device("a batch without buffers".to_owned()))
     }
 
-    /// Makes room for a batch of `candidates` and puts its figures on the device: the rows of their cars (see
-    /// [`ModelTable::rows`]) and what `others` says of each.
+    /// How the figures of a batch are to lie.
+    pub fn figures(&self) -> FigurePlanes {
+        self.figures
+    }
+
+    /// Makes room for a batch of `candidates` and puts its figures on the device.
     ///
     /// # Errors
     /// [`Error::Device`] if the device fails.
-    pub fn load<const OTHERS: usize>(
-        &mut self,
-        candidates: usize,
-        rows: &[f32],
-        others: impl Fn(usize) -> [f64; OTHERS] + Sync,
-    ) -> Result<()> {
+    pub fn load(&mut self, candidates: usize, figures: &[f32]) -> Result<()> {
         self.reserve(candidates)?;
         let batch = self.buffers()?;
-        let others: Vec<[f64; OTHERS]> = (0..candidates).into_par_iter().map(&others).collect();
-        let varying = self.varying;
-        let figures = planes(
-            [candidates, batch.stride, self.figures],
-            |lane, figure| match figure.checked_sub(varying) {
-                None => rows[lane * varying + figure],
-                Some(other) => others[lane][other] as f32,
-            },
-        );
-        self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
+        self.context.write(&batch.figures, bytemuck::cast_slice(figures));
         Ok(())
     }
 
@@ -214,7 +248,7 @@ impl<const STATE: usize> Trajectories<STATE> {
     /// # Errors
     /// [`Error::Device`] if the device fails.
     pub fn go_on(&mut self, candidates: usize, first_step: usize, most: usize) -> Result<usize> {
-        let lanes = candidates.next_multiple_of(self.workgroup);
+        let lanes = self.figures.stride(candidates);
         let steps = self.pacing.steps(lanes, &self.batching).min(most);
         let ms = self.dispatch(candidates, first_step, steps)?;
         self.pacing.took(steps, lanes, ms);
@@ -235,7 +269,7 @@ impl<const STATE: usize> Trajectories<STATE> {
             steps: steps as u32,
         };
         self.context.write(&self.stretch, bytemuck::bytes_of(&stretch));
-        let groups = candidates.div_ceil(self.workgroup) as u32;
+        let groups = candidates.div_ceil(self.figures.workgroup) as u32;
         self.context
             .dispatch(&self.kernel, &batch.group, [groups, 1], None)
     }

@@ -7,7 +7,7 @@ use super::problem::ReplayProblem;
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::{CarShape, ReplayShape, base_vectors};
 use crate::evaluate::gpu::{
-    Binding, GpuContext, Kernel, LOOP_ROUNDS, most_rounds, planes, rounds_of, workgroup,
+    Binding, GpuContext, Kernel, LOOP_ROUNDS, made_ahead, most_rounds, planes, rounds_of, workgroup,
 };
 use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
@@ -447,13 +447,17 @@ impl ReplayDevice {
         let (most_candidates, most_windows) = self.batch_size(rows.len());
         let all_windows = self.windows;
         self.reserve(most_candidates, most_windows)?;
-        for candidates in rows.chunks(most_candidates) {
-            let stride = candidates.len().next_multiple_of(self.workgroup);
-            let varying = self.table.varying.len();
-            let by_candidate = self.table.rows(&replay.free, candidates);
-            let figures = planes([candidates.len(), stride, varying], |candidate, figure| {
-                by_candidate[candidate * varying + figure]
-            });
+        // `self` is what the device works with.
+        let (table, workgroup) = (self.table.clone(), self.workgroup);
+        let stride_of = |candidates: usize| candidates.next_multiple_of(workgroup);
+        let figures = |candidates: &[&[f64]]| {
+            let varying = table.varying.len();
+            let rows = table.rows(&replay.free, candidates);
+            let sizes = [candidates.len(), stride_of(candidates.len()), varying];
+            planes(sizes, |candidate, figure| rows[candidate * varying + figure])
+        };
+        made_ahead(rows.chunks(most_candidates), figures, |candidates, figures| {
+            let stride = stride_of(candidates.len());
             let batch = self.buffers()?;
             self.context.write(&batch.figures, bytemuck::cast_slice(&figures));
             for first_window in (0..all_windows).step_by(most_windows) {
@@ -478,8 +482,8 @@ impl ReplayDevice {
                     let at = |plane: usize| f64::from(planes[plane * stride + candidate]);
                     (at(CHANNELS) != 0.0).then(|| std::array::from_fn(at))
                 }));
-            })?;
-        }
+            })
+        })?;
         Ok(errors)
     }
 

@@ -5,7 +5,7 @@ use super::problem::{AIM_FIGURES, SteadyProblem};
 use crate::error::Result;
 use crate::evaluate::gpu::shader::CarShape;
 use crate::evaluate::gpu::{
-    Batching, Binding, GpuContext, Trajectories, TrajectoryKernel, rounds_of, workgroup,
+    Batching, Binding, GpuContext, Trajectories, TrajectoryKernel, made_ahead, rounds_of, workgroup,
 };
 use crate::evaluate::{DeviceKernel, GpuBackend, ModelTable, OnDevice};
 use crate::vehicle::model::STAGES;
@@ -29,21 +29,6 @@ pub struct DevicePlan {
 pub struct SteadyDevice {
     table: ModelTable,
     trajectories: Trajectories<STATE>,
-}
-
-impl SteadyDevice {
-    /// The last states of one batch.
-    fn settled(&mut self, steady: &SteadyProblem, batch: &[&[f64]]) -> Result<Vec<[f32; STATE]>> {
-        let rows = self.table.rows(&steady.free, batch);
-        self.trajectories
-            .load(batch.len(), &rows, |lane| steady.aim_figures(batch[lane]))?;
-        let all = steady.plan().steps as usize;
-        let mut done = 0;
-        while done < all {
-            done += self.trajectories.go_on(batch.len(), done, all - done)?;
-        }
-        self.trajectories.states(batch.len())
-    }
 }
 
 /// Settles cars on a graphics processor.
@@ -96,11 +81,25 @@ impl DeviceKernel<SteadyProblem> for SteadyDevice {
     }
 
     fn outcomes(&mut self, steady: &SteadyProblem, candidates: &[&[f64]]) -> Result<Vec<Settling<f64>>> {
+        let Self { table, trajectories } = self;
         let mut found = Vec::with_capacity(candidates.len());
-        for batch in candidates.chunks(self.trajectories.batch_size()) {
-            let states = self.settled(steady, batch)?.into_par_iter();
+        let all = steady.plan().steps as usize;
+        let planes = trajectories.figures();
+        let figures = |batch: &[&[f64]]| {
+            let rows = table.rows(&steady.free, batch);
+            planes.of(batch.len(), &rows, |lane| steady.aim_figures(batch[lane]))
+        };
+        let batches = candidates.chunks(trajectories.batch_size());
+        made_ahead(batches, figures, |batch, figures| {
+            trajectories.load(batch.len(), &figures)?;
+            let mut done = 0;
+            while done < all {
+                done += trajectories.go_on(batch.len(), done, all - done)?;
+            }
+            let states = trajectories.states(batch.len())?.into_par_iter();
             found.par_extend(states.map(|state| Settling::from_array(state).widened()));
-        }
+            Ok(())
+        })?;
         Ok(found)
     }
 }

@@ -1,5 +1,5 @@
-//! Particles in blocks of lanes, and how they move. Twin of `shaders/swarm.wgsl`, with the same operations. The kernel moves a
-//! particle in one pass over its coordinates, for memory's sake; lanes take difference moves and mutations one by one, and
+//! Particles in blocks of lanes, and how they move. Twin of `shaders/swarm.wgsl`, with the same operations. The kernel puts particles
+//! of a block that do the same beside one another; lanes pull all of them, take difference moves and mutations one by one, and
 //! crossings a few at a time.
 //!
 //! Positions and velocities are single precision: a coordinate in the unit cube is known to 6e-8 of its range.

@@ -473,11 +473,6 @@ pub fn take_in(
     );
 }
 
-/// The front of a part of a swarm by itself.
-pub fn learn_from(rows: &[f64], width: usize) -> Vec<Point> {
-    part(rows, width, 0, |_| true, &[])
-}
-
 impl Optimiser for LargeSwarm {
     fn ask(&mut self) -> Vec<f64> {
         let (n, width) = (self.settings.motion.population, self.space.variables());

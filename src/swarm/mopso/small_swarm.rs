@@ -165,8 +165,7 @@ impl SmallSwarm {
                     Move::Difference => self.difference_move(particle, leader),
                     Move::Pull => {
                         let own = &self.best_position[self.particles.row(particle)];
-                        self.particles.pull(
-                            particle,
+                        self.particles.one(particle).pull(
                             (own, &self.archive.positions[leader]),
                             &self.settings.motion,
                             (share, self.counters.iteration),

@@ -4,7 +4,7 @@
 use crate::error::{Error, Result};
 use crate::evaluate::gpu::shader::line_swarm;
 use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
-use crate::evaluate::resident::{failed_objective, groups};
+use crate::evaluate::resident::{failed_objective, groups, sliced_groups};
 use crate::evaluate::{Failure, Variable};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -129,7 +129,7 @@ impl Exchange {
     fn dispatch(
         &self,
         context: &GpuContext,
-        kernel: &Kernel,
+        (kernel, [x, y, z]): (&Kernel, [u32; 3]),
         [first, candidates, stride]: [usize; 3],
         [table, from, to]: [&wgpu::Buffer; 3],
     ) -> Result<()> {
@@ -146,12 +146,11 @@ impl Exchange {
         };
         context.write(&self.task, bytemuck::bytes_of(&task));
         let group = context.bind(kernel, &[&self.task, table, from, to])?;
-        let (x, y) = groups(candidates);
         context.run_ahead(|encoder| {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(&kernel.pipeline);
             pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(x, y, 1);
+            pass.dispatch_workgroups(x, y, z);
         })
     }
 
@@ -167,7 +166,9 @@ impl Exchange {
         position: &wgpu::Buffer,
         figures: &wgpu::Buffer,
     ) -> Result<()> {
-        self.dispatch(context, &self.take, batch, [&self.figures, position, figures])
+        let groups = sliced_groups(context, batch[1], self.widths[1]);
+        let buffers = [&self.figures, position, figures];
+        self.dispatch(context, (&self.take, groups), batch, buffers)
     }
 
     /// Gives a batch's objectives to the swarm.
@@ -181,11 +182,8 @@ impl Exchange {
         results: &wgpu::Buffer,
         objectives: &wgpu::Buffer,
     ) -> Result<()> {
-        self.dispatch(
-            context,
-            &self.give,
-            batch,
-            [&self.objectives, results, objectives],
-        )
+        let (x, y) = groups(batch[1]);
+        let buffers = [&self.objectives, results, objectives];
+        self.dispatch(context, (&self.give, [x, y, 1]), batch, buffers)
     }
 }
