@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::fmt;
+use std::sync::OnceLock;
 
 /// The environment variable that names an adapter if no flag does.
 pub const ADAPTER_VARIABLE: &str = "LAPSWARM_ADAPTER";
@@ -125,11 +126,23 @@ impl fmt::Display for DeviceSummary {
     }
 }
 
-fn enumerate() -> Vec<(wgpu::Adapter, DeviceSummary)> {
+/// The first instance lives as long as the process, so that drivers stay loaded: after it had been loaded three dozen times in a process,
+/// that of an NVIDIA card found no adapter.
+static FIRST: OnceLock<wgpu::Instance> = OnceLock::new();
+
+fn new_instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
     descriptor.flags = wgpu::InstanceFlags::empty();
-    let instance = wgpu::Instance::new(descriptor);
+    wgpu::Instance::new(descriptor)
+}
+
+fn enumerate() -> Vec<(wgpu::Adapter, DeviceSummary)> {
+    // Later ones see what has come and gone since.
+    let instance = match FIRST.get() {
+        Some(_) => new_instance(),
+        None => FIRST.get_or_init(new_instance).clone(),
+    };
     let mut adapters: Vec<_> = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
         .into_iter()
         .filter(|adapter| {
