@@ -65,8 +65,8 @@ const FEW: usize = 1000;
 
 /// Members that leave one by one with what they touched kept up to date; more leave faster.
 const FEW_LEAVE: usize = 8;
-/// Members whose shares a thread works out in a row.
-const MEASURED_TOGETHER: usize = 32;
+/// Members from which on threads work out their shares: to wake them takes longer for fewer.
+const MEASURED_IN_THREADS: usize = 256;
 
 /// The reference point lies this share of the archive's range beyond its worst values, so that extremes count.
 const BEYOND: f64 = 0.1;
@@ -325,13 +325,13 @@ impl Archive {
 
     /// Works out what the members contribute, once for all that ask.
     pub(super) fn measure(&mut self) {
+        if self.len() < MEASURED_IN_THREADS {
+            (0..self.shares.len()).for_each(|i| _ = self.known(i));
+            return;
+        }
         let (columns, reference) = (&self.columns, &self.reference);
-        let unknown = self
-            .shares
-            .par_iter_mut()
-            .enumerate()
-            .with_min_len(MEASURED_TOGETHER);
-        unknown.filter(|(_, share)| !share.exact).for_each(|(i, share)| {
+        let shares = self.shares.par_iter_mut().enumerate();
+        shares.filter(|(_, share)| !share.exact).for_each(|(i, share)| {
             *share = Share {
                 least: columns.exclusive(i, reference),
                 exact: true,
