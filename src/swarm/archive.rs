@@ -205,8 +205,7 @@ impl Archive {
         if self.by_contribution() {
             self.shares = vec![Share::default(); self.len()];
             self.objectives.iter().for_each(|row| self.columns.push(row));
-            let first = self.objectives[0].clone();
-            self.refresh(&first, false);
+            self.move_reference();
         }
         let beyond = self.len().saturating_sub(self.capacity);
         if beyond > 0 && self.by_contribution() {

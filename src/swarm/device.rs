@@ -384,7 +384,7 @@ impl DeviceMopso {
             .read_back((from, 0), readback, bytes, bytemuck::pod_collect_to_vec)
     }
 
-    /// Notes the particles that may enter the archive beside so many members, once personal bests have learnt if they are to.
+    /// Notes the particles that may enter an archive of these members. If the swarm `learns`, its personal bests learn first.
     fn note(&self, members: &[[f64; 3]], learns: bool) -> Result<Noted> {
         let Buffers {
             archive,
@@ -429,7 +429,7 @@ impl DeviceMopso {
         })
     }
 
-    /// Lets personal bests learn.
+    /// Lets personal bests learn, and finds what enters the archive.
     fn learn(&self) -> Result<Newcomers> {
         let (d, width) = (self.space.dimensions(), self.objectives);
         let at = |row: &Vec<f64>| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0));

@@ -7,7 +7,7 @@
 //! TEC 10, 2006, with its constants). It explores many hollows where a swarm with one leader commits itself to one.
 
 use super::checkpoint::to_bytes;
-use super::motion::{Particles, Purpose};
+use super::motion::{Particles, Purpose, half_way_back};
 use super::settings::setting;
 use super::space::Space;
 use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
@@ -144,16 +144,8 @@ impl DifferenceSwarm {
                 let own = self.home[at + k];
                 let of = |p: usize| self.home[p * d + k];
                 let moved = of(from) + scale * (of(first) - of(second));
-                self.particles.position[at + k] = if k != always && uniform(5 + k) >= share {
-                    own
-                } else if moved < 0.0 {
-                    // Half-way to the bound that was overstepped, which keeps the spread of the swarm.
-                    0.5 * own
-                } else if moved > 1.0 {
-                    0.5 * (own + 1.0)
-                } else {
-                    moved
-                };
+                let take = k == always || uniform(5 + k) < share;
+                self.particles.position[at + k] = if take { half_way_back(own, moved) } else { own };
             }
         }
     }

@@ -214,6 +214,17 @@ impl Particle<'_> {
     }
 }
 
+/// A coordinate that has moved, or half-way from the own one to the bound that was overstepped, which keeps the spread of the swarm.
+pub(super) fn half_way_back(own: f64, moved: f64) -> f64 {
+    if moved < 0.0 {
+        0.5 * own
+    } else if moved > 1.0 {
+        0.5 * (own + 1.0)
+    } else {
+        moved
+    }
+}
+
 /// Trials beside particles, for which an evaluation has rows after those of the particles.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Trials {

@@ -1,7 +1,7 @@
 //! Single-objective particle swarm.
 
 use super::checkpoint::to_bytes;
-use super::motion::{Particle, Particles, Purpose, Trials};
+use super::motion::{Particle, Particles, Purpose, Trials, half_way_back};
 use super::settings::PsoSettings;
 use super::space::Space;
 use super::{AcceptsMigrants, Counters, Front, Islands, Optimiser};
@@ -109,16 +109,7 @@ fn difference_move(
         let own = at(particle.number);
         let moved = own + scale * (at(towards) - own) + scale * (at(first) - at(second));
         let take = k == always || uniform(8 + k as u32) < crossover;
-        // Half-way back to the bound that was overstepped, which keeps the spread of the swarm.
-        let target = if !take {
-            own
-        } else if moved < 0.0 {
-            0.5 * own
-        } else if moved > 1.0 {
-            0.5 * (own + 1.0)
-        } else {
-            moved
-        };
+        let target = if take { half_way_back(own, moved) } else { own };
         particle.velocity[k] = target - particle.position[k];
         particle.position[k] = target;
     }
