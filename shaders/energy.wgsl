@@ -298,32 +298,37 @@ fn segment_energy(
 // Fills `speeds_squared` with the greatest speeds squared from which the car can brake for all that follows.
 fn ceilings(candidate: u32) {
     let n = stretch.sections;
-    var next = select(n - 1u, stretch.start, CLOSED);
-    var spot = spot_at(next, candidate);
-    var speed_squared = corner(spot.ground);
-    speeds_squared[place_of(next, candidate)] = speed_squared;
+    let last = select(n - 1u, stretch.start, CLOSED);
+    var spot = spot_at(last, candidate);
+    var here = previous(last);
+    var there = spot_at(here, candidate);
+    var speed_squared = steered_corner(there.length, there.ground, spot.ground);
+    speeds_squared[place_of(last, candidate)] = speed_squared;
     // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
     // own values.
     let steps = select(n - 1u, 2u * n, CLOSED);
     for (var i = 0u; i < steps; i++) {
-        let before = select(n - 1u, next - 1u, next > 0u);
-        let there = spot_at(before, candidate);
+        let before = previous(here);
+        let earlier = spot_at(before, candidate);
         let reached = braked(speed_squared, there.length, end_of(there, spot.ground), there.ground);
         let again = i + 1u >= n;
         var most: f32;
         if again {
-            most = speeds_squared[place_of(before, candidate)];
-        } else {
+            most = speeds_squared[place_of(here, candidate)];
+        } else if !CLOSED && here == 0u {
             most = corner(there.ground);
+        } else {
+            most = steered_corner(earlier.length, earlier.ground, there.ground);
         }
         let slower = reached < most;
         if again && !slower {
             break;
         }
         speed_squared = select(most, reached, slower);
-        speeds_squared[place_of(before, candidate)] = speed_squared;
+        speeds_squared[place_of(here, candidate)] = speed_squared;
         spot = there;
-        next = before;
+        there = earlier;
+        here = before;
     }
     if !CLOSED {
         let first = place_of(0u, candidate);

@@ -532,6 +532,10 @@ fn braked(end: f32, length: f32, there: Ground, here: Ground) -> f32 {
     return end + length * (first + brake);
 }
 
+fn previous(section: u32) -> u32 {
+    return select(stretch.sections - 1u, section - 1u, section > 0u);
+}
+
 fn lap_time(candidate: u32) -> f32 {
     let n = stretch.sections;
     let start = select(0u, stretch.start, CLOSED);
@@ -541,7 +545,7 @@ fn lap_time(candidate: u32) -> f32 {
     var spot = spot_at(start, candidate);
     var speed_squared = 0.0;
     if CLOSED {
-        let before = spot_at(select(n - 1u, start - 1u, start > 0u), candidate);
+        let before = spot_at(previous(start), candidate);
         speed_squared = steered_corner(before.length, before.ground, spot.ground);
     } else {
         speed_squared = min(corner(spot.ground), stretch.entry);
@@ -573,7 +577,7 @@ fn lap_time(candidate: u32) -> f32 {
     speed_squared = speeds_squared[place_of(next, candidate)];
     spot = spot_at(next, candidate);
     for (var i = 0u; i < steps; i++) {
-        let before = select(n - 1u, next - 1u, next > 0u);
+        let before = previous(next);
         let there = spot_at(before, candidate);
         let reached = braked(speed_squared, there.length, end_of(there, spot.ground), there.ground);
         let known = speeds_squared[place_of(before, candidate)];

@@ -234,7 +234,7 @@ pub fn corner<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, ground: impl Grou
 /// The corner speed squared (m^2/s^2) at the end of a segment of a length (m), no greater than the steering follows the change of
 /// curvature at. Where the bend changes sides, each of its sides is followed by itself.
 #[inline(always)]
-fn steered_corner<R: Lookup, G: Ground<R>>(
+pub(super) fn steered_corner<R: Lookup, G: Ground<R>>(
     envelope: &EnvelopeTable<R::Storage>,
     length: R,
     before: G,

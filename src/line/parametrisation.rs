@@ -4,7 +4,8 @@ use super::plan::{LinePlan, TERMS};
 use crate::error::{Error, Result};
 use crate::evaluate::Variable;
 use crate::track::CrossSections;
-use nalgebra::DMatrix;
+use clarabel::algebra::CscMatrix;
+use clarabel::qdldl::{QDLDLFactorisation, QDLDLSettings};
 
 /// The meaning of a line's coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -293,36 +294,46 @@ impl Parametrisation {
         };
         let scales = self.scales(cross_sections);
         // Normal equations plus a very small multiple of the identity, so that control points without a section stay in the
-        // middle.
-        let mut matrix = DMatrix::<f64>::identity(count, count) * 1e-9;
-        let mut right = DMatrix::from_element(count, lines.len(), 0.5e-9);
+        // middle. Few entries are not zero: those of control points that are near one another.
+        let (mut rows, mut columns): (Vec<usize>, Vec<usize>) = (0..count).map(|i| (i, i)).unzip();
+        let mut values = vec![1e-9; count];
+        let mut found = vec![vec![0.5e-9; count]; lines.len()];
         for section in 0..cross_sections.len() {
             let weights = self.weights_at(cross_sections, section);
             let origin = self.origin(cross_sections, section, scales[section]);
             for (i, weight) in weights {
-                for (line, alpha) in lines.iter().enumerate() {
-                    right[(i, line)] += weight * ((alpha[section] - origin) / scales[section]);
+                for (right, alpha) in found.iter_mut().zip(lines) {
+                    right[i] += weight * ((alpha[section] - origin) / scales[section]);
                 }
-                for (j, other) in weights {
-                    matrix[(i, j)] += weight * other;
+                for (j, other) in weights.into_iter().filter(|(j, _)| i <= *j) {
+                    rows.push(i);
+                    columns.push(j);
+                    values.push(weight * other);
                 }
             }
         }
-        let solution = matrix.cholesky().map(|c| c.solve(&right)).ok_or_else(|| {
-            Error::input(
+        let matrix = CscMatrix::new_from_triplets(count, count, rows, columns, values);
+        let exact = QDLDLSettings {
+            regularize_enable: false,
+            ..QDLDLSettings::default()
+        };
+        let factors = QDLDLFactorisation::new(&matrix, Some(exact)).ok();
+        let Some(mut factors) = factors.filter(|f| f.positive_inertia() == count) else {
+            return Err(Error::input(
                 &cross_sections.name,
                 "line, control points",
                 count.to_string(),
                 "a number that the sections determine",
-            )
-        })?;
-        let bounds = self.bounds(cross_sections);
-        let held = |line: usize| {
-            let held = solution.column(line);
-            let held = held.iter().zip(&bounds);
-            held.map(|(c, (lower, upper))| c.clamp(*lower, *upper)).collect()
+            ));
         };
-        Ok((0..lines.len()).map(held).collect())
+        let bounds = self.bounds(cross_sections);
+        for row in &mut found {
+            factors.solve(row);
+            for (c, (lower, upper)) in row.iter_mut().zip(&bounds) {
+                *c = c.clamp(*lower, *upper);
+            }
+        }
+        Ok(found)
     }
 
     /// The variables among the coefficients that [`Parametrisation::fit`] gives.

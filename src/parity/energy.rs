@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::Failure;
 use crate::evaluate::energy::{Free, HybridLine, HybridObjective, HybridProblem, Strategy};
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
-use crate::line::geometry;
+use crate::line::{PointMass, geometry};
 use crate::study::raceline::{RacelineSettings, set_up};
 use crate::vehicle::Car;
 use crate::vehicle::limits::{SpeedRange, car_envelope};
@@ -155,6 +155,11 @@ pub fn problems(sections: usize, modes: &[Mode], drs: bool, hills: bool) -> Resu
     let mut surface = Vec::new();
     if hills {
         let (road, point_mass) = in_relief(&setup.cross_sections, &car.point_mass)?;
+        // Steering that is too slow for the bends of the circuit.
+        let point_mass = PointMass {
+            max_steer_rate_radps: Some(0.05),
+            ..point_mass
+        };
         surface = road.relief_of(&points_m).unwrap_or_default();
         car = EnergyCar::of(car.car, point_mass, traction)?;
     }

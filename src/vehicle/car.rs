@@ -46,6 +46,10 @@ impl Tyres {
     }
 }
 
+/// Greatest steering rate at the road wheels of a car whose file says nothing of it (rad/s): 40 deg/s, which are 560 deg/s at a steering
+/// wheel with a ratio of 14.
+pub(super) const USUAL_STEER_RATE_RADPS: f64 = 0.698_131_700_797_731_8;
+
 /// A car.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Car {
@@ -59,6 +63,8 @@ pub struct Car {
     pub steering_ratio: f64,
     /// The greatest road-wheel angle, rad.
     pub max_steer_rad: f64,
+    /// Greatest steering rate at the road wheels (rad/s).
+    pub max_steer_rate_radps: f64,
     /// Engine and gears, if the car has them.
     pub powertrain: Option<Powertrain>,
     /// Motor-generators and store, where there are any.
@@ -199,6 +205,9 @@ impl Car {
             max_steer_rad: steering
                 .number("max_road_wheel_angle_rad", 0.01, 1.5, "rad")?
                 .unwrap_or(0.5),
+            max_steer_rate_radps: steering
+                .number("max_road_wheel_rate_radps", 1e-3, 1e3, "rad/s")?
+                .unwrap_or(USUAL_STEER_RATE_RADPS),
             powertrain,
             hybrid,
             reached,
@@ -276,8 +285,8 @@ impl Car {
             }
         }
         text.push_str(&format!(
-            "\n[steering]\nratio = {:?}\nmax_road_wheel_angle_rad = {:?}\n",
-            self.steering_ratio, self.max_steer_rad
+            "\n[steering]\nratio = {:?}\nmax_road_wheel_angle_rad = {:?}\nmax_road_wheel_rate_radps = {:?}\n",
+            self.steering_ratio, self.max_steer_rad, self.max_steer_rate_radps
         ));
         if let Some(powertrain) = &self.powertrain {
             text.push('\n');

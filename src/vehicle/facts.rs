@@ -4,6 +4,7 @@
 //! asked for; the inertias from the places of the wheels; the engine from a torque curve of usual shape; the gears in a geometric
 //! row. The figures are a start to be fitted to a log, not measurements.
 
+use super::car::USUAL_STEER_RATE_RADPS;
 use super::chassis::Chassis;
 use super::limits::STEER_TO_GRIP;
 use super::parameters::ParameterInfo;
@@ -191,6 +192,7 @@ impl CarFacts {
             tyres: base.tyres,
             steering_ratio: self.steering_ratio,
             max_steer_rad: 0.5,
+            max_steer_rate_radps: USUAL_STEER_RATE_RADPS,
             powertrain: Some(self.powertrain(top_mps, drag_area)),
             hybrid: None,
             reached: None,

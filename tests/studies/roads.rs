@@ -189,7 +189,7 @@ fn slow_steering_is_obeyed_by_the_fastest_line() {
     let laps = [40.0, 5.0].map(|steering_rate_deg_s| {
         let folder = tempfile::tempdir().expect("a folder");
         let settings = RacelineSettings {
-            steering_rate_deg_s,
+            steering_rate_deg_s: Some(steering_rate_deg_s),
             ..STREET.settings(folder.path())
         };
         let summary = found(&settings, folder.path());

@@ -35,6 +35,7 @@ impl EnergyCar {
         let point_mass = PointMass {
             ellipse_exponent,
             max_steer_rad: Some(car.max_steer_rad),
+            max_steer_rate_radps: Some(car.max_steer_rate_radps),
             rotating_mass_factor: car.rotating_mass_factor(),
             ..PointMass::new(envelope, wheelbase)
         };

@@ -157,7 +157,8 @@ fn a_climb_takes_time_and_fuel() {
 }
 
 /// The lap of the engine alone is the quasi-steady-state lap of the line's kernel on hills, banking and a slippery road: both passes of
-/// that against braking first and driving after. On the oval they are the same to second order in its 7 m steps.
+/// that against braking first and driving after. On the oval they are the same to second order in its 7 m steps. So they are with a
+/// car whose steering is too slow for its speed.
 #[test]
 fn the_engine_alone_has_the_lap_of_the_line_on_any_road() {
     let points = oval();
@@ -169,30 +170,46 @@ fn the_engine_alone_has_the_lap_of_the_line_on_any_road() {
             [14.0 * angle.sin(), 0.06 * (3.0 * angle).cos(), friction, 0.0]
         })
         .collect();
-    let car = climber(car_without_h());
+    let usual = climber(car_without_h());
     let shape = geometry(&points, true);
     let relief = LineRelief::of(&shape.segment_m, &shape.curvature_1pm, surface.clone());
     let view = (&shape.segment_m[..], &shape.curvature_1pm[..]);
-    let of_line = |relief: Option<&LineRelief>| {
-        lap_profile_on(&car.point_mass, &car.envelope_table, view, relief, 0.0, &[])
-            .unwrap()
-            .time_s
+    let laps = |car: &EnergyCar| {
+        let of_line = |relief: Option<&LineRelief>| {
+            lap_profile_on(&car.point_mass, &car.envelope_table, view, relief, 0.0, &[])
+                .unwrap()
+                .time_s
+        };
+        let alone = |surface: &[Surface]| {
+            let what = (Mode::Offset, 0.0);
+            lap_of(car, (&points, true), surface, what, 0.0).0.time
+        };
+        let (level, found) = (alone(&[]), alone(&surface));
+        assert!((level / of_line(None) - 1.0).abs() < 1e-3, "{level}");
+        assert!(
+            (found / of_line(Some(&relief)) - 1.0).abs() < 1e-3,
+            "{found} for {}",
+            of_line(Some(&relief))
+        );
+        [level, found]
     };
-    let alone = |surface: &[Surface]| {
-        let what = (Mode::Offset, 0.0);
-        lap_of(&car, (&points, true), surface, what, 0.0).0.time
-    };
-    let (level, found) = (alone(&[]), alone(&surface));
-    assert!((level / of_line(None) - 1.0).abs() < 1e-3, "{level}");
-    assert!(
-        (found / of_line(Some(&relief)) - 1.0).abs() < 1e-3,
-        "{found} for {}",
-        of_line(Some(&relief))
-    );
+    let [level, found] = laps(&usual);
     assert!(
         found > 1.01 * level,
         "{found} s on a slippery road, {level} s on a dry one"
     );
+    let slow = PointMass {
+        max_steer_rate_radps: Some(0.002),
+        ..usual.point_mass.clone()
+    };
+    let traction = Traction::of(&usual.car, &slow.envelope);
+    let slow = EnergyCar::of(usual.car.clone(), slow, traction).unwrap();
+    for (slow, usual) in laps(&slow).iter().zip([level, found]) {
+        assert!(
+            *slow > 1.01 * usual,
+            "{slow} s with slow steering, {usual} s else"
+        );
+    }
 }
 
 /// A surface that is not one for each point, or a car that knows no loads, is refused.

@@ -16,7 +16,9 @@
 //! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
 
 use super::super::ground::{Ground, Grounds, LevelRoad, SlopedRoad};
-use super::super::kernel::{BLOCK, Course, braked, corner, driving_with_drs, look_up, may_open};
+use super::super::kernel::{
+    BLOCK, Course, braked, corner, driving_with_drs, look_up, may_open, steered_corner,
+};
 use super::super::point_mass::EnvelopeTable;
 use super::figures::{EnergyLap, SegmentEnergy};
 use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
@@ -518,13 +520,16 @@ fn ceilings<R: Lookup, G: Grounds<R>>(
     let n = course.curvature.len();
     speeds.clear();
     speeds.resize(n, R::lit(0.0));
+    let previous = |section: usize| if section > 0 { section - 1 } else { n - 1 };
     let mut next = if closed { start } else { n - 1 };
-    speeds[next] = corner(envelope, G::at(course, next, next));
+    let mut here = previous(next);
+    let [from, to] = [here, next].map(|section| G::at(course, section, section));
+    speeds[next] = steered_corner(envelope, course.length[here], from, to);
     // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
     // own values.
     let steps = if closed { 2 * n } else { n - 1 };
     for step in 0..steps {
-        let here = if next > 0 { next - 1 } else { n - 1 };
+        let before = previous(here);
         let reached = braked(
             envelope,
             speeds[next],
@@ -535,15 +540,18 @@ fn ceilings<R: Lookup, G: Grounds<R>>(
         let again = step + 1 >= n;
         let most = if again {
             speeds[here]
-        } else {
+        } else if !closed && here == 0 {
             corner(envelope, G::at(course, here, here))
+        } else {
+            let [from, to] = [before, here].map(|section| G::at(course, section, section));
+            steered_corner(envelope, course.length[before], from, to)
         };
         let slower = reached.less_than(most);
         speeds[here] = R::select(slower, reached, most);
         if again && R::all(!slower) {
             break;
         }
-        next = here;
+        (next, here) = (here, before);
     }
     if !closed {
         speeds[0] = speeds[0].min(entry);

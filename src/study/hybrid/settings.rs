@@ -119,6 +119,8 @@ settings! {
             "Greatest distance between the points at which energy is accounted";
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
             "Width of the car";
+        steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
+            "Fastest turn of the front wheels; without it the car's own";
         entry_mps: f64 ["m/s"] = 10.0, number(0.5, 150.0),
             "Greatest speed at the start of an open track";
         scenarios: Vec<Scenario> ["-"] = published(), of(Scenarios),
@@ -302,6 +304,7 @@ impl HybridStudySettings {
             sections: self.sections,
             car_width_m: self.car_width_m,
             entry_mps: self.entry_mps,
+            steering_rate_deg_s: self.steering_rate_deg_s,
             seed: self.seed,
             backend: self.backend,
             adapter: self.adapter.clone(),

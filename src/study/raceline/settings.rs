@@ -62,8 +62,8 @@ settings! {
             "Room that is left between the car and either edge";
         ellipse_exponent: f64 ["-"] = 2.0, number(1.0, 4.0),
             "Exponent of the friction ellipse";
-        steering_rate_deg_s: f64 ["deg/s"] = 40.0, number(0.1, 10_000.0),
-            "Fastest turn of the front wheels; where a line would need a faster one, the car is slower";
+        steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
+            "Fastest turn of the front wheels, where a line would need a faster one the car is slower; without it the car's own";
         entry_mps: f64 ["m/s"] = 10.0, number(0.5, 150.0),
             "Greatest speed at the start of an open track";
         objectives: Vec<LineObjective> ["-"] = usual_objectives(), choices(),

@@ -126,7 +126,11 @@ pub(super) fn point_mass(
     let car = PointMass {
         ellipse_exponent: settings.ellipse_exponent,
         max_steer_rad: Some(car.max_steer_rad),
-        max_steer_rate_radps: Some(settings.steering_rate_deg_s.to_radians()),
+        max_steer_rate_radps: Some(
+            settings
+                .steering_rate_deg_s
+                .map_or(car.max_steer_rate_radps, f64::to_radians),
+        ),
         rotating_mass_factor: car.rotating_mass_factor(),
         relief: road.relief.is_some(),
         ..PointMass::new(envelope, wheelbase)

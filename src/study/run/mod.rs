@@ -294,6 +294,7 @@ fn run_stages(
             track: Some(line.track.clone()),
             car: car_path.clone(),
             car_width_m: settings.raceline.car_width_m,
+            steering_rate_deg_s: settings.raceline.steering_rate_deg_s,
             ..TransientSettings::default()
         };
         let points_m = read_line(&line_path)?;

@@ -28,6 +28,8 @@ settings! {
             "The g-g-v envelope from a table instead of the car's own";
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
             "Width of the car, all of which stays within the edges";
+        steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
+            "Fastest turn of the front wheels that the driver's plan counts on; without it the car's own";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
             "Shares of the envelope's grip to drive with; without it from 0.3 on for one line alone and from 0.8 on for a population";
         deployment: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap_swarm.csv\""),
@@ -136,6 +138,7 @@ impl TransientSettings {
             car: self.car.clone(),
             envelope: self.envelope.clone(),
             car_width_m: self.car_width_m,
+            steering_rate_deg_s: self.steering_rate_deg_s,
             ..RacelineSettings::default()
         })
     }
