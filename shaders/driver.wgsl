@@ -10,6 +10,7 @@ struct Driver {
     slip_limit: f32,
     slip_stiffness: f32,
     max_steer: f32,
+    steer_rate: f32,
     knows: f32,
     rear_slip_per_ay: f32,
     rear_slip_steep: f32,
@@ -112,7 +113,7 @@ fn act(
     let yaw_lack = curvature_ahead(course, view.pose, 0.08 * v) * v - body.yaw_rate;
     let asked = wheelbase * curvature + understeer - driver.heading_gain * heading + 0.045 * yaw_lack;
     let steer = min(max(asked, -driver.max_steer), driver.max_steer);
-    let rate = min(max((steer - controls.steer) / driver.steer_lag, -0.9), 0.9);
+    let rate = min(max((steer - controls.steer) / driver.steer_lag, -driver.steer_rate), driver.steer_rate);
 
     let behind = planned_speed(course, pace, view, driver.speed_ahead * v) - body.vx;
     let ahead = driver.plan_ahead * v;

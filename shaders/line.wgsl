@@ -8,8 +8,9 @@
 // lateral, grip, drive, drag at their start and then of their rises,
 // behind them the cells of traction, and from OPEN_AT on the same of the car with its DRS open. On a road that is not level and dry
 // the same again from LOADS_AT on, under each of LOADS loads, LOAD_STEP rows apart; behind the sections then stand as many whose
-// weights are height and banking: `step_rise`, `across_rise`, sine and cosine, and whose `step` is the friction at the right end and
-// what it gains to the left. Then `corners` and `ellipse` in rows of a figure and its rise.
+// weights are height and banking: `step_rise`, `across_rise`, sine and cosine, whose `constant` is the friction at the right edge of the road,
+// whose `sources` are the bits of what it gains on each of four steps to the left edge, and whose `step` says how many of these steps the
+// right end of the cross-section is from the edge, and the left end from that. Then `corners` and `ellipse` in rows of a figure and its rise.
 // All lanes read the same section, so these tables are uniform buffers if they fit. The envelope is one only on drivers that let
 // lanes read different rows at full speed.
 
@@ -184,7 +185,9 @@ fn shape(candidate: u32) -> vec4<f32> {
 fn crossing(section: u32, candidate: u32) -> vec4<f32> {
     let share = alpha(section, variables_of(section, candidate));
     let relief = sections[stretch.sections + section];
-    return vec4<f32>(share * sections[section].across, share * relief.weights.y, relief.step.x + share * relief.step.y);
+    let steps = vec4<f32>(relief.step.x + share * relief.step.y) - vec4<f32>(0.0, 1.0, 2.0, 3.0);
+    let friction = relief.constant + dot(saturate(steps), bitcast<vec4<f32>>(relief.sources));
+    return vec4<f32>(share * sections[section].across, share * relief.weights.y, friction);
 }
 
 // A segment's direction in space and its length.

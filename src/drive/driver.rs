@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 pub(super) const PEDAL_LAG_S: f64 = 0.06;
 /// Time constant of the driver's arms, s.
 const STEER_LAG: f64 = 0.04;
-/// Greatest rate of the driver's arms, rad/s.
+/// Greatest rate at which a driver's arms turn the front wheels, rad/s; a car may have slower steering.
 const STEER_RATE: f64 = 0.9;
 /// Steering that a driver who does not know the car adds for understeer, rad per g and metre of wheelbase.
 const UNDERSTEER: f64 = 0.0025;
@@ -67,6 +67,8 @@ driver_table! {
     slip_stiffness,
     /// Greatest road-wheel angle, rad.
     max_steer,
+    /// Greatest rate of it, rad/s.
+    steer_rate,
     /// One for a driver who knows the car, zero for one who does not.
     knows,
     /// Slip angle of the rear axle for every m/s^2 of lateral acceleration, rad s^2/m,
@@ -116,6 +118,7 @@ impl DriverTable<f64> {
             slip_limit: settings.slip_limit,
             slip_stiffness: settings.slip_stiffness,
             max_steer: car.max_steer_rad,
+            steer_rate: car.max_steer_rate_radps.min(STEER_RATE),
             knows: knowledge.map_or(0.0, |_| 1.0),
             rear_slip_per_ay: rear_slip[0],
             rear_slip_steep: rear_slip[1],
@@ -375,9 +378,10 @@ pub fn act<R: Lookup>(
         + R::lit(0.045) * yaw_lack;
     let most = R::load(driver.max_steer);
     let wanted = wanted.max(-most).min(most);
+    let fastest = R::load(driver.steer_rate);
     let rate = ((wanted - controls.steer) / R::load(driver.steer_lag))
-        .max(R::lit(-STEER_RATE))
-        .min(R::lit(STEER_RATE));
+        .max(-fastest)
+        .min(fastest);
 
     let behind = planned_speed(road, course, pace, view, R::load(driver.speed_ahead) * v) - body.vx;
     let look = R::load(driver.plan_ahead) * v;

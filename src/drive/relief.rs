@@ -49,7 +49,7 @@ pub(super) fn row_of(circuit: &Circuit, sample: usize) -> [f64; RELIEF_WIDTH] {
     let bow = (after - 2.0 * here + before) / (reach_m * reach_m) * level.powi(3);
     let (sin, cos) = relief.bank_rad[sample].sin_cos();
     let turn = level * level * circuit.curvature_1pm[sample];
-    let [friction, per_m] = relief.friction[sample];
+    let [friction, per_m] = relief.friction[sample].at(0.0);
     [
         GRAVITY_MPS2 * slope * level,
         GRAVITY_MPS2 * level * sin,

@@ -2,7 +2,7 @@
 
 use super::{FineLine, RoadEdges};
 use crate::error::{Error, Place, Result};
-use crate::track::{Circuit, Relief, ReliefChange};
+use crate::track::{Circuit, FrictionAcross, Relief, ReliefChange, SurfaceAcross};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -92,13 +92,9 @@ impl FineLine {
                 .push(mix(self.curvature_1pm[at], self.curvature_1pm[next]));
             if let Some(relief) = &self.relief {
                 let (here, there) = (relief.surface[at], relief.surface[next]);
-                surfaces.push(std::array::from_fn(|k: usize| mix(here[k], there[k])));
+                surfaces.push([0, 1, 2, 3].map(|k| mix(here[k], there[k])));
             }
         }
-        circuit.relief = self
-            .relief
-            .as_ref()
-            .map(|_| Relief::of(surfaces.into_iter(), ReliefChange::default()));
         let edges = RoadEdges::new(&edges_m[0], &edges_m[1], true);
         let abreast = edges.abreast(&circuit.centreline_m);
         let room = |left: bool| -> Vec<f64> {
@@ -116,6 +112,17 @@ impl FineLine {
             let found = format!("a line that leaves the car's side {:.2} m beyond an edge", -least);
             let expected = "a line within the edges of this circuit";
             return Err(Error::input(name, place.named("line"), found, expected));
+        }
+        if self.relief.is_some() {
+            let across = surfaces.into_iter().zip(left.iter().zip(&right));
+            let across = across.map(
+                |([z_m, bank_rad, friction, per_m], (left, right))| SurfaceAcross {
+                    z_m,
+                    bank_rad,
+                    friction: FrictionAcross::linear([friction, per_m], [*left, *right]),
+                },
+            );
+            circuit.relief = Some(Relief::of(across, ReliefChange::default()));
         }
         (circuit.width_right_m, circuit.width_left_m) = (right, left);
         Ok(circuit)

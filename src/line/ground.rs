@@ -7,7 +7,7 @@
 //! of the load `f_N`, of which [`EnvelopeTable::loads`] has several. What tyres can do goes with the friction of the road; what they take
 //! from the drive in a bend goes with its square, since their slip angles go with it, too.
 
-use super::kernel::{Course, alpha, look_up};
+use super::kernel::{Course, alpha, held, look_up};
 use super::loads::LoadTables;
 use super::plan::{LinePlan, ReliefRow};
 use super::point_mass::{ENVELOPE_WIDTH, EnvelopeTable, TRACTION_ROOTS, TRACTION_SPEEDS, TRACTION_WIDTH};
@@ -429,11 +429,16 @@ impl<R: Real> Rising<R> {
 fn crossing<R: Real>(plan: &LinePlan<R::Storage>, i: usize, variables: &[R]) -> [R; 4] {
     let (row, relief) = (&plan.rows[i], &plan.relief[i]);
     let share = alpha(row, plan.terms, variables);
+    let steps = R::load(relief.friction_from) + share * R::load(relief.friction_across);
+    let mut friction = R::load(relief.friction);
+    for (k, rise) in relief.friction_rises.iter().enumerate() {
+        friction = friction + held(steps - R::lit(k as f64)) * R::load(*rise);
+    }
     [
         share * R::load(row.across[0]),
         share * R::load(row.across[1]),
         share * R::load(relief.across_rise),
-        R::load(relief.friction) + share * R::load(relief.across_friction),
+        friction,
     ]
 }
 

@@ -120,10 +120,16 @@ pub fn alpha<R: Real>(row: &SectionRow<R::Storage>, terms: usize, variables: &[R
     for term in 0..terms {
         sum = sum + R::load(row.weights[term]) * variables[row.sources[term] as usize];
     }
+    held(sum)
+}
+
+/// A share held from 0 to 1.
+#[inline(always)]
+pub(super) fn held<R: Real>(share: R) -> R {
     let (zero, one) = (R::lit(0.0), R::lit(1.0));
-    // `min` and `max` would lose the derivatives of a sum exactly on the edge.
-    let sum = R::select(sum.less_than(zero), zero, sum);
-    R::select(one.less_than(sum), one, sum)
+    // `min` and `max` would lose the derivatives of a share exactly on the edge.
+    let share = R::select(share.less_than(zero), zero, share);
+    R::select(one.less_than(share), one, share)
 }
 
 /// From the right end of a cross-section to the line (m).

@@ -276,13 +276,10 @@ pub fn cross_sections_about(
     }
     let points = cross_sections.points(&cross_sections.reference);
     cross_sections.drs = road.drs_along(&points);
-    cross_sections.relief = road.relief_along(&points).map(|relief| SectionRelief {
-        z_m: relief.iter().map(|[z, ..]| *z).collect(),
-        bank_rad: relief.iter().map(|[_, bank, ..]| *bank).collect(),
-        friction: relief
-            .iter()
-            .map(|[.., friction, per_m]| [*friction, *per_m])
-            .collect(),
+    cross_sections.relief = road.relief_across(&points).map(|across| SectionRelief {
+        z_m: across.iter().map(|surface| surface.z_m).collect(),
+        bank_rad: across.iter().map(|surface| surface.bank_rad).collect(),
+        friction: across.iter().map(|surface| surface.friction).collect(),
         foot_m: points,
     });
     Ok(cross_sections)

@@ -1,7 +1,7 @@
 //! The tables of a line's cross-sections that kernels read.
 
 use crate::scalar::Real;
-use crate::track::{CrossSections, Surface};
+use crate::track::{CrossSections, FRICTION_PLACES, Surface};
 use glam::DVec2;
 
 /// Terms of the sum that gives `alpha` at a section.
@@ -26,6 +26,9 @@ pub struct SectionRow<S> {
     pub drs: bool,
 }
 
+/// Even steps from edge to edge of a road on which the friction is linear.
+pub const FRICTION_STEPS: usize = FRICTION_PLACES - 1;
+
 /// The surface at one section: height in differences, banking and friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReliefRow<S> {
@@ -37,10 +40,14 @@ pub struct ReliefRow<S> {
     pub sin: S,
     /// See above.
     pub cos: S,
-    /// Friction at the right end of the cross-section, as a share of the car's own,
+    /// Friction at the right edge of the road, as a share of the car's own,
     pub friction: S,
-    /// and what it gains from there to the left end.
-    pub across_friction: S,
+    /// and what it gains on each of so many even steps from there to the left edge.
+    pub friction_rises: [S; FRICTION_STEPS],
+    /// How many of these steps the right end of the cross-section is from the edge,
+    pub friction_from: S,
+    /// and the left end from the right one.
+    pub friction_across: S,
 }
 
 /// All sections, and the order in which a lap passes them.
@@ -91,19 +98,28 @@ impl LinePlan<f64> {
     /// The plan with the surface of `cross_sections`, where that is not level and dry.
     pub fn with_relief(mut self, cross_sections: &CrossSections) -> Self {
         let ends = [&cross_sections.right_m, &cross_sections.left_m];
-        let [Some(right), Some(left)] = ends.map(|points| cross_sections.relief_of(points)) else {
+        let surfaces = ends.map(|points| cross_sections.relief_of(points));
+        let (Some(relief), [Some(right), Some(left)]) = (&cross_sections.relief, surfaces) else {
             return self;
         };
         let n = right.len();
         let row = |i: usize| {
-            let [z, bank, friction, _] = right[i];
+            let [z, bank, ..] = right[i];
+            let friction = &relief.friction[i];
+            let across = cross_sections.left_m[i] - cross_sections.right_m[i];
+            let [from, to] = ends.map(|ends| {
+                let left_m = (ends[i] - relief.foot_m[i]).dot(across.normalize_or_zero());
+                friction.place(left_m)
+            });
             ReliefRow {
                 step_rise: right[(i + 1) % n][0] - z,
                 across_rise: left[i][0] - z,
                 sin: bank.sin(),
                 cos: bank.cos(),
-                friction,
-                across_friction: left[i][2] - friction,
+                friction: friction.of[0],
+                friction_rises: std::array::from_fn(|k| friction.of[k + 1] - friction.of[k]),
+                friction_from: from,
+                friction_across: to - from,
             }
         };
         self.relief = (0..n).map(row).collect();
@@ -140,7 +156,9 @@ impl LinePlan<f64> {
             sin: bank.sin(),
             cos: bank.cos(),
             friction: *friction,
-            across_friction: 0.0,
+            friction_rises: [0.0; FRICTION_STEPS],
+            friction_from: 0.0,
+            friction_across: 0.0,
         };
         self.relief = surface.iter().enumerate().map(row).collect();
         self
@@ -176,7 +194,9 @@ impl LinePlan<f64> {
                     sin: store(row.sin),
                     cos: store(row.cos),
                     friction: store(row.friction),
-                    across_friction: store(row.across_friction),
+                    friction_rises: row.friction_rises.map(store),
+                    friction_from: store(row.friction_from),
+                    friction_across: store(row.friction_across),
                 })
                 .collect(),
         }

@@ -3,7 +3,7 @@
 use super::ground::{Ground, Grounds, Sloped, SlopedRoad};
 use super::kernel::{self, Course, Wanted, lap_time, shape};
 use super::*;
-use crate::track::{CrossSections, SectionRelief};
+use crate::track::{CrossSections, FrictionAcross, SectionRelief};
 use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
 use glam::DVec2;
@@ -60,7 +60,7 @@ fn ring(
             foot_m,
             z_m: (0..sections).map(|i| relief(angle(i))[0]).collect(),
             bank_rad: (0..sections).map(|i| relief(angle(i))[1]).collect(),
-            friction: vec![[1.0, 0.0]; sections],
+            friction: vec![FrictionAcross::DRY; sections],
         }),
     }
 }
@@ -338,7 +338,7 @@ fn limits_under_a_load_are_those_that_were_swept() {
 /// A flat ring of 100 m whose friction is so much on the middle and gains so much per metre to the left, which is its inside.
 fn slippery_ring(friction: [f64; 2]) -> CrossSections {
     let mut road = ring(360, |_| 100.0, 10.0, |_| [0.0, 0.0]);
-    road.relief.as_mut().unwrap().friction = vec![friction; 360];
+    road.relief.as_mut().unwrap().friction = vec![FrictionAcross::linear(friction, [5.0; 2]); 360];
     road
 }
 
@@ -353,6 +353,25 @@ fn the_corner_speed_goes_with_the_friction_of_the_place() {
         let wanted = friction * 12.0 * radius;
         let found = kernel::corner::<f64>(&table, there);
         assert!((found / wanted - 1.0).abs() < 1e-9, "{found} for {wanted}");
+    }
+    // A wet strip in the middle of the road is where it is for a car that uses less of it.
+    let mut road = road;
+    let strip = FrictionAcross {
+        right_m: 5.0,
+        left_m: 5.0,
+        of: [1.0, 1.0, 0.5, 1.0, 0.9],
+    };
+    road.relief.as_mut().unwrap().friction = vec![strip; 360];
+    let narrow = road.narrowed(2.0).unwrap();
+    for (share, friction) in [(0.1, 1.0), (0.4, 0.7), (0.5, 0.5), (0.6, 0.7), (0.85, 0.96)] {
+        for (road, alpha) in [(&road, share), (&narrow, (10.0 * share - 1.0) / 8.0)] {
+            let there = ground(&course_of(road, &[alpha; 360]), 17);
+            assert!(
+                (there.friction - friction).abs() < 1e-9,
+                "{share}: {}",
+                there.friction
+            );
+        }
     }
 }
 

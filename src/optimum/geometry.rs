@@ -4,6 +4,7 @@ use super::bounds::{Bounds, RowBound};
 use crate::Result;
 use crate::line::{LinePlan, LineRelief, Parametrisation, SectionRow};
 use crate::track::{CrossSections, SectionRelief};
+use crate::vehicle::powertrain::GRAVITY_MPS2;
 use glam::DVec2;
 
 /// The points of a line as a linear function of its variables: `point_j = origin_j + sum of reach_jk x_k`.
@@ -335,6 +336,19 @@ impl Shape {
         if per_m != 0.0 {
             let bar = left[i] * (scale * per_m / friction);
             terms.extend(map.reach(i).iter().map(|&(k, reach)| (k, reach.dot(bar))));
+        }
+    }
+
+    /// Adds `scale` times the change of gravity along segment `s` (m/s^2), whose ends rise and fall as they move across a banked road.
+    pub fn add_climb(&self, map: &LineMap, s: usize, scale: f64, terms: &mut Vec<(usize, f64)>) {
+        let (Some(relief), Some((_, left))) = (&self.relief, &map.relief) else {
+            return;
+        };
+        let per_rise = scale * GRAVITY_MPS2 / relief.length_m[s];
+        for (point, sign) in [((s + 1) % map.points(), 1.0), (s, -1.0)] {
+            let [_, bank_rad, ..] = relief.surface[point];
+            let bar = left[point] * (sign * per_rise * bank_rad.tan());
+            terms.extend(map.reach(point).iter().map(|&(k, reach)| (k, reach.dot(bar))));
         }
     }
 

@@ -1,7 +1,8 @@
 //! What a car can do at one place of a road that is not level and dry, as the solvers use it.
 //!
-//! A step's model takes the load's curvature, banking and gradient of each place as they are on the line that it starts from, and the
-//! friction with what it gains across the road; laps by which steps are judged have those of their own line. What rotates counts as
+//! A step's model takes the banking of each place and the load's curvature as they are on the line that it starts from: a line that moves
+//! across the road moves within the surface, so that the latter stays to first order. Gradient and friction have what they gain across
+//! the road. Laps by which steps are judged have the figures of their own line. What rotates counts as
 //! lifted with the car on a climb, which moves a lap by less than a ten-thousandth.
 
 use super::geometry::Shape;
@@ -216,7 +217,7 @@ mod tests {
     use super::super::{Bounds, DescentSettings, LineMap, PointMassEnvelope, ReferenceProblem, fastest};
     use super::*;
     use crate::line::{FineLine, PointMass};
-    use crate::track::{CrossSections, SectionRelief, Shape};
+    use crate::track::{CrossSections, FrictionAcross, SectionRelief, Shape};
     use crate::vehicle::{BendTraction, Envelope, EnvelopeRow};
     use std::f64::consts::TAU;
 
@@ -233,7 +234,7 @@ mod tests {
             bank_rad: (0..150)
                 .map(|i| -share * 0.07 * (1.0 + (2.0 * angle(i)).cos()))
                 .collect(),
-            friction: vec![[1.0, 0.0]; 150],
+            friction: vec![FrictionAcross::DRY; 150],
         };
         CrossSections {
             relief: Some(relief),
@@ -292,6 +293,7 @@ mod tests {
         let angle = |i: usize| TAU * i as f64 / 150.0;
         wet.relief.as_mut().unwrap().friction = (0..150)
             .map(|i| [0.7 + 0.2 * (3.0 * angle(i)).sin(), 0.02 * (2.0 * angle(i)).cos()])
+            .map(|of| FrictionAcross::linear(of, [6.0; 2]))
             .collect();
         let wet = times(&wet);
         assert!(wet[0] / hills[0] > 1.1, "{wet:?} {hills:?}");
@@ -317,7 +319,7 @@ mod tests {
         let envelope = PointMassEnvelope::new(&car).unwrap();
         let ring = Shape::parse("circle:95:105").unwrap().unwrap();
         let level = ring.cross_sections(120).unwrap();
-        let fastest_on = |friction: [f64; 2]| {
+        let fastest_on = |friction: FrictionAcross| {
             let road = CrossSections {
                 relief: Some(SectionRelief {
                     foot_m: level.points(&[0.5; 120]),
@@ -335,7 +337,17 @@ mod tests {
             let bounds = Bounds::road(120);
             fastest(&problem, &bounds, &[0.5; 120], &DescentSettings::default()).unwrap()
         };
-        for (friction, radius, there) in [([0.7, 0.04], 105.0, 0.9), ([0.7, 0.0], 95.0, 0.7)] {
+        // Driven clockwise, the outside is the left. The last has its grip in the middle of the road alone.
+        let linear = |of: [f64; 2]| FrictionAcross::linear(of, [5.0; 2]);
+        let ridge = FrictionAcross {
+            of: [0.5, 0.5, 0.9, 0.5, 0.5],
+            ..linear([1.0, 0.0])
+        };
+        for (friction, radius, there) in [
+            (linear([0.7, 0.04]), 105.0, 0.9),
+            (linear([0.7, 0.0]), 95.0, 0.7),
+            (ridge, 100.0, 0.9),
+        ] {
             let found = fastest_on(friction);
             let wanted_s = TAU * (radius / (there * 12.0f64)).sqrt();
             // A ring of 120 chords is a part in ten thousand shorter than its circle.

@@ -140,21 +140,21 @@ fn add_segment(
     let per_square = 0.5 / v;
     let acceleration = 0.5 * (e1 - e0) / h;
     let demand = acceleration + grip.drag.value;
-    // Terms of a quantity that changes with the speeds at both ends, the segment's length.
-    let terms = |by_start: f64, by_end: f64, by_length: f64| {
-        let mut terms = vec![(first + s, e0 * by_start), (first + next, e1 * by_end)];
-        shape.add_length(map, s, by_length, &mut terms);
+    let along = grip.longitudinal.value;
+    // Terms of a quantity that changes with the speeds at both ends.
+    let terms = |by_start: f64, by_end: f64| vec![(first + s, e0 * by_start), (first + next, e1 * by_end)];
+    // Those of one that also changes with the acceleration that is asked for, over the grip.
+    let demanding = |by_start: f64, by_end: f64, by_demand: f64| {
+        let share = by_demand / along;
+        let mut terms = terms(by_start - 0.5 * share / h, by_end + 0.5 * share / h);
+        shape.add_length(map, s, -share * acceleration / h, &mut terms);
+        shape.add_climb(map, s, share, &mut terms);
         terms
     };
     let affine = |constant: f64, terms| Affine { constant, terms }.merged();
-    let along = grip.longitudinal.value;
     // Each end has half of the effect of a change at the middle.
     let slope = 0.5 * per_square * (grip.drag.by_speed - demand * grip.longitudinal.by_speed / along) / along;
-    let by_length = -acceleration / (h * along);
-    let longitudinal = affine(
-        demand / along,
-        terms(slope - 0.5 / (h * along), slope + 0.5 / (h * along), by_length),
-    );
+    let longitudinal = affine(demand / along, demanding(slope, slope, 1.0));
     let (across, lean) = (grip.lateral.value, envelope.lean_mps2());
     // After a step the other end may be the tighter one, so both are limited.
     let mixtures = match lap.bends.ends[s] {
@@ -169,7 +169,7 @@ fn add_segment(
             .sum();
         let used = (curvature * middle + lean) / across;
         let slope = 0.5 * (curvature / across - used * per_square * grip.lateral.by_speed / across);
-        let mut change = terms(slope, slope, 0.0);
+        let mut change = terms(slope, slope);
         for (end, share) in ends {
             shape.add_curvature(map, end, share * middle / across, &mut change);
         }
@@ -203,7 +203,7 @@ fn add_segment(
         if let Some(traction) = traction.filter(|_| least < demand + NEAR * along) {
             let slope = 0.5 * per_square * (traction.by_speed - grip.drag.by_speed) / along;
             let by_root = traction.by_root / along;
-            let mut change = terms(slope + 0.5 / (h * along), slope - 0.5 / (h * along), -by_length);
+            let mut change = demanding(slope, slope, -1.0);
             let spare = ((traction.value - demand) / along).max(0.0);
             if far {
                 let tangent = -by_root * used / root;
@@ -224,7 +224,7 @@ fn add_segment(
     let slope = 0.5 * per_square * (grip.drive.by_speed - grip.drag.by_speed) / along;
     let spare = affine(
         ((grip.drive.value - demand) / along).max(0.0),
-        terms(slope + 0.5 / (h * along), slope - 0.5 / (h * along), -by_length),
+        demanding(slope, slope, -1.0),
     );
     program.add_nonnegative(spare);
 }

@@ -11,7 +11,7 @@ use crate::evaluate::drive::{
     DriveObjective, DriveProblem, DriveSettings, GpuDriveEvaluator, SimdDriveEvaluator,
 };
 use crate::scalar::{Counted, Lookup, operations_of};
-use crate::track::{Circuit, Relief, ReliefChange, Track};
+use crate::track::{Circuit, FrictionAcross, Relief, ReliefChange, Track};
 use crate::vehicle::powertrain::GRAVITY_MPS2;
 use crate::vehicle::{Car, CarModel, MagicFormula};
 use rayon::prelude::*;
@@ -87,10 +87,11 @@ pub fn in_hills(mut circuit: Circuit) -> Circuit {
         friction: stations
             .iter()
             .map(|s| {
-                [
+                let of = [
                     0.9 + 0.08 * (3.0 * angle(s)).cos(),
                     0.006 * (5.0 * angle(s)).sin(),
-                ]
+                ];
+                FrictionAcross::linear(of, [6.0; 2])
             })
             .collect(),
         change: ReliefChange::default(),

@@ -7,7 +7,7 @@ use crate::evaluate::line::{LineObjective, LineProblem};
 use crate::line::{Parametrisation, PointMass, geometry, kernel};
 use crate::scalar::{Counted, operations_of};
 use crate::study::raceline::{RacelineSettings, set_up};
-use crate::track::{CrossSections, SectionRelief};
+use crate::track::{CrossSections, FrictionAcross, SectionRelief};
 use crate::vehicle::{Envelope, EnvelopeRow};
 use std::f64::consts::TAU;
 
@@ -132,7 +132,15 @@ pub fn in_relief(road: &CrossSections, car: &PointMass) -> Result<(CrossSections
             .collect(),
         bank_rad: (0..n).map(|i| 0.1 * (5.0 * angle(i)).sin()).collect(),
         friction: (0..n)
-            .map(|i| [0.8 + 0.15 * (3.0 * angle(i)).cos(), 0.02 * (4.0 * angle(i)).sin()])
+            .map(|i| {
+                let half_m = 0.5 * road.right_m[i].distance(road.left_m[i]);
+                let wave = |k: usize| 0.1 * (4.0 * angle(i) + 2.0 * k as f64).sin();
+                FrictionAcross {
+                    right_m: half_m,
+                    left_m: half_m,
+                    of: std::array::from_fn(|k| 0.8 + 0.15 * (3.0 * angle(i)).cos() + wave(k)),
+                }
+            })
             .collect(),
     };
     let under = |share: f64| {

@@ -4,7 +4,8 @@ use glam::DVec2;
 
 use super::clothoid::displacement;
 use super::crossing::bridges;
-use super::relief::{Relief, ReliefFacts, Surface, cubic, mixed};
+use super::friction::FrictionAcross;
+use super::relief::{Relief, ReliefFacts, SurfaceAcross, cubic};
 use crate::{Error, Result};
 
 /// A named stretch of a circuit.
@@ -209,9 +210,9 @@ impl Circuit {
         (between(&self.width_left_m), between(&self.width_right_m))
     }
 
-    /// The surface on the centreline at a station, of a road that is not level and dry: height and banking by the cubic through the four
+    /// The surface about the centreline at a station (m), of a road that is not level and dry: height and banking by the cubic through the four
     /// samples about it, friction linear between two.
-    pub fn relief_at(&self, station_m: f64) -> Option<Surface> {
+    pub fn relief_at(&self, station_m: f64) -> Option<SurfaceAcross> {
         let relief = self.relief.as_ref()?;
         let at = self.locate(station_m);
         let n = self.station_m.len();
@@ -222,15 +223,17 @@ impl Circuit {
         };
         let t = at.past_m / self.spacing_m();
         let value = |of: &[f64]| cubic([before, at.before, at.after, after].map(|i| of[i]), t);
-        let [friction, per_m] = mixed(relief.friction[at.before], relief.friction[at.after], t);
-        Some([value(&relief.z_m), value(&relief.bank_rad), friction, per_m])
+        Some(SurfaceAcross {
+            z_m: value(&relief.z_m),
+            bank_rad: value(&relief.bank_rad),
+            friction: FrictionAcross::mixed(&relief.friction[at.before], &relief.friction[at.after], t),
+        })
     }
 
     /// What the road's height comes to, if it has one.
     pub fn relief_facts(&self) -> Option<ReliefFacts> {
         let relief = self.relief.as_ref()?;
-        let widths = [self.width_left_m.as_slice(), &self.width_right_m];
-        Some(relief.facts(&self.station_m, widths, self.spacing_m(), self.closed))
+        Some(relief.facts(&self.station_m, self.spacing_m(), self.closed))
     }
 
     fn frame_in_lap(&self, station_m: f64) -> Frame {

@@ -2,7 +2,8 @@
 
 use super::circuit::{Corner, Section};
 use super::crossing::bridges;
-use super::relief::{SectionRelief, Surface, beside, cubic, mixed};
+use super::friction::FrictionAcross;
+use super::relief::{SectionRelief, Surface, SurfaceAcross, cubic};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::ops::Range;
@@ -305,6 +306,12 @@ impl CrossSections {
     /// The surface at each point (m) of a line along the road, of a road that is not level and dry: height and banking by the cubic
     /// through the four cross-sections about it, friction linear between two.
     pub fn relief_along(&self, points_m: &[DVec2]) -> Option<Vec<Surface>> {
+        let across = self.relief_across(points_m)?;
+        Some(across.iter().map(|across| across.at(0.0)).collect())
+    }
+
+    /// As [`CrossSections::relief_along`], and what lies to the left and right of each point.
+    pub(crate) fn relief_across(&self, points_m: &[DVec2]) -> Option<Vec<SurfaceAcross>> {
         let relief = self.relief.as_ref()?;
         let n = self.len() as isize;
         let index = |i: isize| {
@@ -328,15 +335,17 @@ impl CrossSections {
             } else {
                 0.0
             };
-            let z = cubic(four.map(|i| relief.z_m[i]), t);
-            let bank = cubic(four.map(|i| relief.bank_rad[i]), t);
             let foot = DVec2::new(
                 cubic(four.map(|i| relief.foot_m[i].x), t),
                 cubic(four.map(|i| relief.foot_m[i].y), t),
             );
             let across = left(four[1]).lerp(left(four[2]), t).normalize_or_zero();
-            let [friction, per_m] = mixed(relief.friction[four[1]], relief.friction[four[2]], t);
-            beside([z, bank, friction, per_m], (*point - foot).dot(across))
+            let plane = SurfaceAcross {
+                z_m: cubic(four.map(|i| relief.z_m[i]), t),
+                bank_rad: cubic(four.map(|i| relief.bank_rad[i]), t),
+                friction: FrictionAcross::mixed(&relief.friction[four[1]], &relief.friction[four[2]], t),
+            };
+            plane.seen_from((*point - foot).dot(across))
         };
         let nearest = self.nearest_along(points_m);
         Some(points_m.iter().zip(nearest).map(at).collect())
@@ -344,10 +353,16 @@ impl CrossSections {
 
     /// The surface at a line's points (m), one per cross-section, of a road that is not level and dry.
     pub fn relief_of(&self, points_m: &[DVec2]) -> Option<Vec<Surface>> {
+        let across = self.relief_across_of(points_m)?;
+        Some(across.iter().map(|across| across.at(0.0)).collect())
+    }
+
+    /// As [`CrossSections::relief_of`], and what lies to the left and right of each point.
+    pub(crate) fn relief_across_of(&self, points_m: &[DVec2]) -> Option<Vec<SurfaceAcross>> {
         let relief = self.relief.as_ref()?;
         let at = |(i, point): (usize, &DVec2)| {
             let left = (self.left_m[i] - self.right_m[i]).normalize_or_zero();
-            relief.at(i, left, *point)
+            relief.plane(i).seen_from((*point - relief.foot_m[i]).dot(left))
         };
         Some(points_m.iter().enumerate().map(at).collect())
     }

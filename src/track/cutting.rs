@@ -60,12 +60,9 @@ pub(super) fn cross_sections(road: &dyn Road, count: usize) -> Result<CrossSecti
     let frames = &cutter.frames;
     let relief = road.relief_change().map(|_| SectionRelief {
         foot_m: frames.iter().map(|frame| frame.position_m).collect(),
-        z_m: frames.iter().map(|frame| frame.relief[0]).collect(),
-        bank_rad: frames.iter().map(|frame| frame.relief[1]).collect(),
-        friction: frames
-            .iter()
-            .map(|frame| [frame.relief[2], frame.relief[3]])
-            .collect(),
+        z_m: frames.iter().map(|frame| frame.surface.z_m).collect(),
+        bank_rad: frames.iter().map(|frame| frame.surface.bank_rad).collect(),
+        friction: frames.iter().map(|frame| frame.surface.friction).collect(),
     });
     Ok(CrossSections {
         reference,

@@ -2,7 +2,8 @@
 
 use super::circuit::Circuit;
 use super::cross_sections::CrossSections;
-use super::relief::{Surface, beside};
+use super::friction::FRICTION_NAMES;
+use super::relief::SurfaceAcross;
 use crate::files::write_new;
 use crate::{Error, Result};
 use glam::DVec2;
@@ -10,29 +11,39 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Points (m) with their distances to the right and the left edge (m) in the racetrack database's format, to the micrometre. On a
-/// road that is not level and dry `relief` has the surface of each: height and banking follow in columns of their own, and the friction
-/// at both edges where it is not 1 everywhere.
-pub fn racetrack_csv(rows: impl Iterator<Item = (DVec2, f64, f64)>, relief: Option<&[Surface]>) -> String {
+/// road that is not level and dry `relief` has the surface about each: height and banking follow in columns of their own, and where it
+/// is not 1 everywhere the friction, at both edges or from edge to edge.
+pub fn racetrack_csv(
+    rows: impl Iterator<Item = (DVec2, f64, f64)>,
+    relief: Option<&[SurfaceAcross]>,
+) -> String {
     let mut text = "# x_m,y_m,w_tr_right_m,w_tr_left_m".to_owned();
     if relief.is_some() {
         text += ",z_m,bank_deg";
     }
-    let wet = relief
-        .iter()
-        .any(|surfaces| surfaces.iter().any(|s| [s[2], s[3]] != [1.0, 0.0]));
+    let frictions = || relief.iter().copied().flatten().map(|surface| surface.friction);
+    let wet = frictions().any(|friction| !friction.is_dry());
+    let steps = if frictions().all(|friction| friction.is_linear()) {
+        FRICTION_NAMES.len() - 1
+    } else {
+        1
+    };
     if wet {
-        text += ",friction_left,friction_right";
+        for name in FRICTION_NAMES.iter().step_by(steps) {
+            text += ",";
+            text += name;
+        }
     }
     text += "\n";
     for (i, (point, right_m, left_m)) in rows.enumerate() {
         // Writing to a string cannot fail.
         let _ = write!(text, "{:.6},{:.6},{right_m:.6},{left_m:.6}", point.x, point.y);
         if let Some(surface) = relief.and_then(|relief| relief.get(i)) {
-            let [z_m, bank_rad, ..] = surface;
-            let _ = write!(text, ",{z_m:.6},{:.6}", bank_rad.to_degrees());
-            if wet {
-                let [at_left, at_right] = [left_m, -right_m].map(|at| beside(*surface, at)[2]);
-                let _ = write!(text, ",{at_left:.6},{at_right:.6}");
+            let _ = write!(text, ",{:.6},{:.6}", surface.z_m, surface.bank_rad.to_degrees());
+            let last = (FRICTION_NAMES.len() - 1) as f64;
+            for k in (0..FRICTION_NAMES.len()).step_by(steps).filter(|_| wet) {
+                let at_m = k as f64 / last * (left_m + right_m) - right_m;
+                let _ = write!(text, ",{:.6}", surface.friction.at(at_m)[0]);
             }
         }
         text += "\n";
@@ -78,7 +89,7 @@ impl CrossSections {
         let rows = points.iter().zip(ends);
         racetrack_csv(
             rows.map(|(&point, (&right, &left))| (point, point.distance(right), point.distance(left))),
-            self.relief_of(&points).as_deref(),
+            self.relief_across_of(&points).as_deref(),
         )
     }
 

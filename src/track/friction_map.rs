@@ -1,10 +1,11 @@
 //! Friction of a road as points of a map, as the friction maps beside TUM's racetrack database have it.
 
-use super::relief::FRICTIONS;
+use super::friction::{FRICTION_PLACES, FRICTIONS};
 use super::survey::Survey;
 use crate::config::read_text;
 use crate::error::{Error, Place, Result};
 use glam::DVec2;
+use nalgebra::{SMatrix, SVector};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -85,14 +86,15 @@ impl FrictionMap {
         (distance <= REACH_M * REACH_M).then(|| self.friction[i])
     }
 
-    /// Friction at the left and the right edge beside each point of a survey: the straight line that is nearest, by least squares, to
-    /// what the map has from edge to edge, held within the range of that. Where the map has no point within 5 m, the friction is
-    /// `elsewhere`.
+    /// Friction from the right edge to the left beside each point of a survey, as
+    /// [`FrictionAcross::of`](super::FrictionAcross::of): what is nearest, by least squares, to what the map has from edge to edge, held
+    /// within the range of that. Where the map has no point within 5 m, the friction is `elsewhere`.
     ///
     /// # Errors
     /// [`Error::Input`] for a map that has no point on the road.
-    pub fn beside(&self, survey: &Survey, elsewhere: f64) -> Result<Vec<[f64; 2]>> {
+    pub fn beside(&self, survey: &Survey, elsewhere: f64) -> Result<Vec<[f64; FRICTION_PLACES]>> {
         let (n, centre_m) = (survey.centre_m.len(), &survey.centre_m);
+        let fit = fitting();
         let mut met = false;
         let mut row = |i: usize| {
             let (before, after) = if survey.closed {
@@ -101,23 +103,15 @@ impl FrictionMap {
                 (centre_m[i.max(1) - 1], centre_m[(i + 1).min(n - 1)])
             };
             let left = (after - before).normalize_or_zero().perp();
-            let (mut sum, mut slope, mut squares) = (0.0, 0.0, 0.0);
-            let (mut least, mut most) = (f64::INFINITY, 0.0f64);
-            for k in 0..ACROSS {
-                // From the right edge, -1, to the left one, 1.
-                let share = 2.0 * k as f64 / (ACROSS - 1) as f64 - 1.0;
-                let width_m = 0.5 * (survey.left_m[i] + survey.right_m[i]);
-                let offset_m = 0.5 * (survey.left_m[i] - survey.right_m[i]) + share * width_m;
-                let found = self.at(centre_m[i] + offset_m * left);
+            let found = SVector::<f64, ACROSS>::from_fn(|k, _| {
+                let at_m = k as f64 / (ACROSS - 1) as f64 * (survey.left_m[i] + survey.right_m[i]);
+                let found = self.at(centre_m[i] + (at_m - survey.right_m[i]) * left);
                 met |= found.is_some();
-                let friction = found.unwrap_or(elsewhere);
-                sum += friction / ACROSS as f64;
-                slope += share * friction;
-                squares += share * share;
-                (least, most) = (least.min(friction), most.max(friction));
-            }
-            let rise = slope / squares;
-            [sum + rise, sum - rise].map(|f| f.clamp(least, most))
+                found.unwrap_or(elsewhere)
+            });
+            let (least, most) = (found.min(), found.max());
+            let of: [f64; FRICTION_PLACES] = (fit * found).into();
+            of.map(|f| f.clamp(least, most))
         };
         let rows = (0..n).map(&mut row).collect();
         if !met {
@@ -131,6 +125,17 @@ impl FrictionMap {
         }
         Ok(rows)
     }
+}
+
+/// What makes of the friction at [`ACROSS`] places that at [`FRICTION_PLACES`], by least squares.
+fn fitting() -> SMatrix<f64, FRICTION_PLACES, ACROSS> {
+    let of_places = SMatrix::<f64, ACROSS, FRICTION_PLACES>::from_fn(|k, j| {
+        let place = k as f64 / (ACROSS - 1) as f64 * (FRICTION_PLACES - 1) as f64;
+        (1.0 - (place - j as f64).abs()).max(0.0)
+    });
+    let squares = of_places.transpose() * of_places;
+    // Each place has more than its own share of the row.
+    squares.try_inverse().unwrap_or_default() * of_places.transpose()
 }
 
 /// The square of [`REACH_M`] that a place is in.

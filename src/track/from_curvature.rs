@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 use super::circuit::{Circuit, Corner, Section};
 use super::clothoid::displacement;
-use super::relief::{Given, Relief, Surface, beside, between_edges};
+use super::relief::{Given, Relief, between_edges};
 use crate::{Error, Place, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
@@ -201,13 +201,10 @@ impl CurvatureTable {
             let expected = format!("at least {LEAST_RELIEF_ROWS} rows with height, banking or friction");
             return self.refuse("curvature table", found, &expected);
         }
-        let at_edges = |(row, surface): (&CurvatureRow, Surface)| {
-            [row.width_left_m, -row.width_right_m].map(|at| beside(surface, at)[2])
-        };
         let given = Given {
             z_m: relief.z_m.clone(),
             bank_rad: relief.bank_rad.clone(),
-            friction: self.rows.iter().zip(relief.surfaces()).map(at_edges).collect(),
+            friction: relief.friction.iter().map(|across| across.of).collect(),
             gap_m: relief.change.gap_m,
         };
         let Some(smooth) = given.smoothed(&self.knots(), self.closed, [0.0; 2]) else {

@@ -7,12 +7,12 @@ use toml::Spanned;
 
 use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Circuit;
+use super::friction::{
+    FRICTION_COLUMNS, FRICTION_NAMES, FRICTION_PLACES, FRICTIONS, FrictionAcross, FrictionColumns,
+};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
-use super::relief::{
-    FRICTION_COLUMNS, FRICTIONS, Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG, between_edges,
-    friction_columns,
-};
+use super::relief::{Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG, between_edges};
 use super::survey::{Survey, SurveyOptions};
 use crate::config::{folder_of, line_of, read_text};
 use crate::{Error, Place, Result};
@@ -99,8 +99,8 @@ impl Circuit {
     /// `station_m`.
     ///
     /// Keys with a curvature table: `name`, `curvature_table` (a CSV file with columns `station_m`, `curvature_1pm` and, if
-    /// wanted, `width_left_m`, `width_right_m`, `corner`, `z_m`, `bank_deg`, and `friction` or `friction_left` and
-    /// `friction_right`), `length_m`; `closed` (default true),
+    /// wanted, `width_left_m`, `width_right_m`, `corner`, `z_m`, `bank_deg`, and `friction` or those of places across the road as in
+    /// [`Survey`]), `length_m`; `closed` (default true),
     /// `start_heading_deg` (0), `width_m` (of the whole road, where the table has no widths), `[[sections]]` with `name`,
     /// `start_m`, `end_m`, and `[[drs_zones]]` with `start_m` and `end_m`, where the DRS may be open; one whose end lies before
     /// its start passes the start line.
@@ -207,7 +207,7 @@ fn assemble(
         .map(|f| check.within(f, "friction", FRICTIONS.0, FRICTIONS.1))
         .transpose()?;
     if let Some(friction) = friction.filter(|_| given.friction.is_empty()) {
-        given.friction = vec![[friction; 2]; rows.len()];
+        given.friction = vec![[friction; FRICTION_PLACES]; rows.len()];
     }
     let mut table = CurvatureTable {
         rows,
@@ -239,7 +239,7 @@ fn smooth_relief(
         return Ok((!level).then_some(Relief {
             z_m: given.z_m,
             bank_rad: given.bank_rad,
-            friction: vec![[1.0, 0.0]; table.rows.len()],
+            friction: vec![FrictionAcross::DRY; table.rows.len()],
             change: ReliefChange::default(),
         }));
     }
@@ -256,7 +256,7 @@ fn smooth_relief(
     }))
 }
 
-const COLUMNS: [&str; 10] = [
+const COLUMNS: [&str; 13] = [
     "station_m",
     "curvature_1pm",
     "width_left_m",
@@ -265,8 +265,11 @@ const COLUMNS: [&str; 10] = [
     "z_m",
     "bank_deg",
     "friction",
-    "friction_left",
-    "friction_right",
+    FRICTION_NAMES[0],
+    FRICTION_NAMES[1],
+    FRICTION_NAMES[2],
+    FRICTION_NAMES[3],
+    FRICTION_NAMES[4],
 ];
 
 /// The line of the row at this position. The reader's own count is that of the comments and empty lines before the row.
@@ -327,8 +330,7 @@ fn parse_table(
         height,
         bank,
         friction,
-        at_left,
-        at_right,
+        across @ ..,
     ] = column;
     let missing = |name: &str, found: &str| {
         let place = Place::line(header_line).column(name);
@@ -342,7 +344,7 @@ fn parse_table(
         }
     }
 
-    let frictions = friction_columns([friction, at_left, at_right])
+    let frictions = FrictionColumns::of(friction, across)
         .map_err(|found| Error::input(file, Place::line(header_line), found, FRICTION_COLUMNS))?;
 
     let mut rows: Vec<CurvatureRow> = Vec::new();
@@ -397,10 +399,10 @@ fn parse_table(
             let bank_deg = number(bank, (-STEEPEST_BANK_DEG, STEEPEST_BANK_DEG))?;
             given.bank_rad.push(bank_deg.to_radians());
         }
-        if let Some([left, right]) = frictions {
+        if let Some(columns) = frictions {
             given
                 .friction
-                .push([number(left, FRICTIONS)?, number(right, FRICTIONS)?]);
+                .push(columns.read(|column| number(column, FRICTIONS))?);
         }
     }
     Ok((rows, given))

@@ -7,9 +7,9 @@ use toml::Spanned;
 
 use super::checker::{Checker, DrsZoneEntry, SectionEntry, parse_toml};
 use super::circuit::Corner;
+use super::friction::{FRICTION_PLACES, FRICTIONS};
 use super::friction_map::FrictionMap;
 use super::reference::Smoothing;
-use super::relief::FRICTIONS;
 use super::survey::{Survey, SurveyOptions};
 use crate::Result;
 use crate::config::folder_of;
@@ -91,7 +91,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<(Survey, Smoothing)> {
             survey.friction = map.beside(&survey, elsewhere.unwrap_or(1.0))?;
         }
         (None, Some(friction)) if survey.friction.is_empty() => {
-            survey.friction = vec![[friction; 2]; survey.centre_m.len()];
+            survey.friction = vec![[friction; FRICTION_PLACES]; survey.centre_m.len()];
         }
         _ => {}
     }

@@ -4,7 +4,7 @@ use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
 use super::cutting::cross_sections;
 use super::from_curvature::Closure;
-use super::relief::{Given, LEVEL_AND_DRY, ReliefChange, SmoothRelief, between_edges};
+use super::relief::{Given, ReliefChange, SmoothRelief, SurfaceAcross, between_edges};
 use super::road::{Road, RoadFrame, circuit};
 use super::spline::{Deviation, Spline};
 use super::survey::Survey;
@@ -344,9 +344,12 @@ impl Road for ReferenceLine {
             curvature_1pm: jet.first.perp_dot(jet.second) / speed.powi(3).max(1e-300),
             left_m,
             right_m,
-            relief: self.relief.as_ref().map_or(LEVEL_AND_DRY, |relief| {
-                between_edges(relief.on(i, t), [left_m, right_m])
-            }),
+            surface: self
+                .relief
+                .as_ref()
+                .map_or(SurfaceAcross::LEVEL_AND_DRY, |relief| {
+                    between_edges(relief.on(i, t), [left_m, right_m])
+                }),
         }
     }
 

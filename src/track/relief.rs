@@ -5,6 +5,7 @@
 //! above the right, and the friction, as a share of what the car's own tyres have. A level and dry road has no relief at all, so its
 //! laps are those of the plane.
 
+use super::friction::{FRICTION_PLACES, FrictionAcross, mixed};
 use super::spline::Spline;
 use crate::{Error, Place, Result};
 use glam::DVec2;
@@ -27,16 +28,49 @@ const LONGEST_WAVE_M: f64 = 150.0;
 /// The same of the banking (m).
 const LONGEST_BANK_WAVE_M: f64 = 100.0;
 
-/// Range of the friction, as a share of that of the car's own tyres: from wet ice to a surface better than the one that they were
-/// measured on.
-pub(super) const FRICTIONS: (f64, f64) = (0.05, 1.5);
-
 /// A road's surface at a place: height (m), banking (rad, the left side up), friction as a share of the car's own, and what that
 /// gains per metre to the left (1/m).
 pub type Surface = [f64; 4];
 
-/// The surface of a level and dry road.
-pub const LEVEL_AND_DRY: Surface = [0.0, 0.0, 1.0, 0.0];
+/// A road's surface from edge to edge: a plane, and the friction on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceAcross {
+    /// Height of a point of it (m).
+    pub z_m: f64,
+    /// Angle about the direction of driving by which the left side lies above the right (rad).
+    pub bank_rad: f64,
+    /// Friction to the left and right of that point.
+    pub friction: FrictionAcross,
+}
+
+impl SurfaceAcross {
+    /// The surface of a level and dry road.
+    pub const LEVEL_AND_DRY: Self = Self {
+        z_m: 0.0,
+        bank_rad: 0.0,
+        friction: FrictionAcross::DRY,
+    };
+
+    /// The surface so far (m) to the left of the point.
+    pub fn at(&self, left_m: f64) -> Surface {
+        let [friction, per_m] = self.friction.at(left_m);
+        [
+            self.z_m + self.bank_rad.tan() * left_m,
+            self.bank_rad,
+            friction,
+            per_m,
+        ]
+    }
+
+    /// The same as seen from so far to the left of the point (m).
+    pub(super) fn seen_from(&self, left_m: f64) -> Self {
+        Self {
+            z_m: self.z_m + self.bank_rad.tan() * left_m,
+            bank_rad: self.bank_rad,
+            friction: self.friction.seen_from(left_m),
+        }
+    }
+}
 
 /// What smoothing and closing changed of a road's height and banking.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,8 +92,8 @@ pub struct Relief {
     pub z_m: Vec<f64>,
     /// Angle about the direction of driving by which the left side lies above the right (rad).
     pub bank_rad: Vec<f64>,
-    /// Friction on the centreline as a share of the car's own, and what it gains per metre to the left (1/m).
-    pub friction: Vec<[f64; 2]>,
+    /// Friction to the left and right of it.
+    pub friction: Vec<FrictionAcross>,
     /// What was changed of what was given.
     pub change: ReliefChange,
 }
@@ -85,25 +119,29 @@ pub struct ReliefFacts {
 
 impl Relief {
     /// The relief of these surfaces.
-    pub(crate) fn of(surfaces: impl Iterator<Item = Surface>, change: ReliefChange) -> Self {
+    pub(crate) fn of(surfaces: impl Iterator<Item = SurfaceAcross>, change: ReliefChange) -> Self {
         let mut relief = Self {
             z_m: Vec::new(),
             bank_rad: Vec::new(),
             friction: Vec::new(),
             change,
         };
-        for [z_m, bank_rad, friction, per_m] in surfaces {
-            relief.z_m.push(z_m);
-            relief.bank_rad.push(bank_rad);
-            relief.friction.push([friction, per_m]);
+        for surface in surfaces {
+            relief.z_m.push(surface.z_m);
+            relief.bank_rad.push(surface.bank_rad);
+            relief.friction.push(surface.friction);
         }
         relief
     }
 
     /// Its surfaces.
-    pub(crate) fn surfaces(&self) -> impl Iterator<Item = Surface> {
-        let heights = self.z_m.iter().zip(&self.bank_rad).zip(&self.friction);
-        heights.map(|((z, bank), [friction, per_m])| [*z, *bank, *friction, *per_m])
+    pub(crate) fn surfaces(&self) -> impl Iterator<Item = SurfaceAcross> {
+        let planes = self.z_m.iter().zip(&self.bank_rad).zip(&self.friction);
+        planes.map(|((z_m, bank_rad), friction)| SurfaceAcross {
+            z_m: *z_m,
+            bank_rad: *bank_rad,
+            friction: *friction,
+        })
     }
 
     /// Whether it is all of one height, without banking.
@@ -116,14 +154,8 @@ impl Relief {
         is_dry(&self.friction)
     }
 
-    /// What it comes to at stations (m) of a road that is closed or not, whose left and right edges are so far from the centreline (m).
-    pub fn facts(
-        &self,
-        station_m: &[f64],
-        [left_m, right_m]: [&[f64]; 2],
-        spacing_m: f64,
-        closed: bool,
-    ) -> ReliefFacts {
+    /// What it comes to at stations (m) of a road that is closed or not.
+    pub fn facts(&self, station_m: &[f64], spacing_m: f64, closed: bool) -> ReliefFacts {
         let n = self.z_m.len();
         let steps = n - usize::from(!closed);
         let rise = |i: &usize| self.z_m[(i + 1) % n] - self.z_m[*i];
@@ -137,11 +169,7 @@ impl Relief {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), z| {
                 (least.min(*z), most.max(*z))
             });
-        let edges = left_m.iter().zip(right_m).zip(&self.friction);
-        let frictions = edges.flat_map(|((left, right), &[friction, per_m])| {
-            let level = [0.0, 0.0, friction, per_m];
-            [*left, -right].map(|at| beside(level, at)[2])
-        });
+        let frictions = self.friction.iter().flat_map(|across| across.of);
         let friction = frictions.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], f| {
             [least.min(f), most.max(f)]
         });
@@ -166,8 +194,8 @@ pub struct SectionRelief {
     pub z_m: Vec<f64>,
     /// the angle about the direction of driving by which the cross-section rises to the left (rad),
     pub bank_rad: Vec<f64>,
-    /// and the friction there with what it gains per metre to the left (1/m).
-    pub friction: Vec<[f64; 2]>,
+    /// and the friction to the left and right of the point.
+    pub friction: Vec<FrictionAcross>,
 }
 
 impl SectionRelief {
@@ -193,9 +221,16 @@ impl SectionRelief {
 
     /// The surface at a point (m) of cross-section `i`, whose leftward unit vector is `left`.
     pub fn at(&self, i: usize, left: DVec2, point: DVec2) -> Surface {
-        let [friction, per_m] = self.friction[i];
-        let foot = [self.z_m[i], self.bank_rad[i], friction, per_m];
-        beside(foot, (point - self.foot_m[i]).dot(left))
+        self.plane(i).at((point - self.foot_m[i]).dot(left))
+    }
+
+    /// The plane of cross-section `i`, about its foot.
+    pub(super) fn plane(&self, i: usize) -> SurfaceAcross {
+        SurfaceAcross {
+            z_m: self.z_m[i],
+            bank_rad: self.bank_rad[i],
+            friction: self.friction[i],
+        }
     }
 }
 
@@ -204,51 +239,19 @@ fn is_level(z_m: &[f64], bank_rad: &[f64]) -> bool {
     z_m.iter().all(|z| (z - first).abs() <= LEVEL_M) && bank_rad.iter().all(|bank| bank.abs() <= LEVEL_RAD)
 }
 
-fn is_dry(friction: &[[f64; 2]]) -> bool {
-    friction.iter().all(|friction| *friction == [1.0, 0.0])
+fn is_dry(friction: &[FrictionAcross]) -> bool {
+    friction.iter().all(FrictionAcross::is_dry)
 }
 
-/// The surface so far (m) to the left of a place whose surface is known.
-pub(super) fn beside([z_m, bank_rad, friction, per_m]: Surface, left_m: f64) -> Surface {
-    let friction = friction + per_m * left_m;
-    [
-        z_m + bank_rad.tan() * left_m,
-        bank_rad,
-        friction.clamp(FRICTIONS.0, FRICTIONS.1),
-        per_m,
-    ]
-}
-
-/// Height (m), banking (rad), and friction at the left and at the right edge.
-pub(super) type ToEdges = [f64; 4];
+/// Height (m), banking (rad), and friction from the right edge to the left.
+pub(super) type ToEdges = ([f64; 2], [f64; FRICTION_PLACES]);
 
 /// The surface of a reference line from that up to edges which are so far to its left and right (m).
-pub(super) fn between_edges(
-    [z_m, bank_rad, at_left, at_right]: ToEdges,
-    [left_m, right_m]: [f64; 2],
-) -> Surface {
-    let width_m = left_m + right_m;
-    if width_m <= 0.0 {
-        return [z_m, bank_rad, 0.5 * (at_left + at_right), 0.0];
-    }
-    let per_m = (at_left - at_right) / width_m;
-    [z_m, bank_rad, at_right + per_m * right_m, per_m]
-}
-
-/// What a table may say of friction.
-pub(super) const FRICTION_COLUMNS: &str = "friction, or both friction_left and friction_right";
-
-/// The columns of the friction at the left and at the right edge, from those of `friction`, `friction_left` and `friction_right`.
-///
-/// # Errors
-/// What was found where it is neither of the two.
-pub(super) fn friction_columns(found: [Option<usize>; 3]) -> Result<Option<[usize; 2]>, &'static str> {
-    match found {
-        [None, None, None] => Ok(None),
-        [Some(whole), None, None] => Ok(Some([whole; 2])),
-        [None, Some(left), Some(right)] => Ok(Some([left, right])),
-        [Some(_), ..] => Err("friction beside friction_left or friction_right"),
-        _ => Err("one of friction_left and friction_right"),
+pub(super) fn between_edges(([z_m, bank_rad], of): ToEdges, [left_m, right_m]: [f64; 2]) -> SurfaceAcross {
+    SurfaceAcross {
+        z_m,
+        bank_rad,
+        friction: FrictionAcross { right_m, left_m, of },
     }
 }
 
@@ -259,8 +262,8 @@ pub(super) struct Given {
     pub z_m: Vec<f64>,
     /// Banking (rad), or none.
     pub bank_rad: Vec<f64>,
-    /// Friction at the left and at the right edge, or none.
-    pub friction: Vec<[f64; 2]>,
+    /// Friction from the right edge to the left, as [`FrictionAcross::of`], or none.
+    pub friction: Vec<[f64; FRICTION_PLACES]>,
     /// The gap in height that was spread (m).
     pub gap_m: f64,
 }
@@ -268,7 +271,7 @@ pub(super) struct Given {
 impl Given {
     /// Whether there is nothing that a level and dry road lacks.
     pub fn is_level(&self) -> bool {
-        is_level(&self.z_m, &self.bank_rad) && self.friction.iter().all(|friction| *friction == [1.0; 2])
+        is_level(&self.z_m, &self.bank_rad) && self.friction.iter().all(|of| *of == FrictionAcross::DRY.of)
     }
 
     /// Closes the heights at these stations of a closed line of this length (m). The last row of a line that repeats its first
@@ -347,7 +350,7 @@ impl Given {
             change.bank_rad = bank.deviation(&self.bank_rad).greatest_m;
         }
         let mut friction = self.friction.clone();
-        friction.resize(points, [1.0; 2]);
+        friction.resize(points, FrictionAcross::DRY.of);
         if closed {
             friction.push(friction[0]);
         }
@@ -365,8 +368,8 @@ impl Given {
 pub(super) struct SmoothRelief {
     height: Spline<f64>,
     bank: Spline<f64>,
-    /// At the knots, at the left and at the right edge.
-    friction: Vec<[f64; 2]>,
+    /// At the knots, from the right edge to the left.
+    friction: Vec<[f64; FRICTION_PLACES]>,
     /// What was changed.
     pub change: ReliefChange,
 }
@@ -376,13 +379,11 @@ impl SmoothRelief {
     pub fn on(&self, interval: usize, t: f64) -> ToEdges {
         let (from, to) = (self.height.knots[interval], self.height.knots[interval + 1]);
         let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
-        let [at_left, at_right] = mixed(self.friction[interval], self.friction[interval + 1], share);
-        [
-            self.height.on(interval, t).value,
-            self.bank.on(interval, t).value,
-            at_left,
-            at_right,
-        ]
+        let plane = [&self.height, &self.bank].map(|curve| curve.on(interval, t).value);
+        (
+            plane,
+            mixed(self.friction[interval], self.friction[interval + 1], share),
+        )
     }
 
     /// The surface at a parameter.
@@ -413,11 +414,6 @@ impl SmoothRelief {
         }
         Ok(())
     }
-}
-
-/// Both figures of a friction, `share` of the way from one to another.
-pub(super) fn mixed(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
-    [0, 1].map(|k| from[k] + share * (to[k] - from[k]))
 }
 
 /// The cubic through four figures at even steps, `t` of the way from the second to the third (E. Catmull, R. Rom, *A class of local

@@ -112,7 +112,7 @@ fn friction_comes_through_to_the_cross_sections() {
     }
     // One column is both edges'; dry is no surface at all. A TOML file may say it of the whole road, and columns say more.
     let whole = survey(&circle(",friction", |_| ",0.6".to_owned(), None)).unwrap();
-    assert!(whole.friction.iter().all(|f| *f == [0.6; 2]));
+    assert!(whole.friction.iter().all(|f| *f == [0.6; 5]));
     let dry = survey(&circle(",friction", |_| ",1".to_owned(), None)).unwrap();
     let (dry, _) = dry.smoothed(&Smoothing::default()).unwrap().circuit().unwrap();
     assert!(dry.relief.is_none());
@@ -215,6 +215,14 @@ fn what_no_road_can_be_is_refused_by_name() {
             circle(",friction_left", |_| ",1".to_owned(), None),
             "both friction_left and friction_right",
         ),
+        (
+            circle(
+                ",friction_left,friction_right,friction_50",
+                |_| ",1,1,1".to_owned(),
+                None,
+            ),
+            "found some of friction_right, friction_25",
+        ),
     ] {
         let error = survey(&text).unwrap_err().to_string();
         assert!(error.contains(wanted), "{error}");
@@ -268,6 +276,35 @@ fn heights_of_gpx_and_kml_are_read_where_all_points_have_one() {
     assert_eq!(kml.z_m[1], 301.0);
 }
 
+/// Five columns from edge to edge keep a wet strip where it is, on narrower roads and in an exported file.
+#[test]
+fn a_wet_strip_stays_in_the_middle_of_the_road() {
+    let text = circle(
+        ",friction_right,friction_25,friction_50,friction_75,friction_left",
+        |_| ",1,1,0.5,1,0.9".to_owned(),
+        None,
+    );
+    let road = |text: &str| {
+        let reference = survey(text).unwrap().smoothed(&Smoothing::default()).unwrap();
+        reference.circuit().unwrap().0
+    };
+    let circuit = road(&text);
+    assert_eq!(circuit.relief_facts().unwrap().friction, [0.5, 1.0]);
+    let written = circuit.to_racetrack_csv();
+    assert!(written.contains(",friction_50,"), "{}", &written[..120]);
+    for circuit in [circuit, road(&written)] {
+        let whole = circuit.cross_sections(240).unwrap();
+        let narrow = whole.narrowed(2.0).unwrap();
+        for (share, wanted) in [(0.2, 1.0), (0.4, 0.7), (0.5, 0.5), (0.6, 0.7), (0.85, 0.96)] {
+            // The middle of a car of 2 m on 10 m of road.
+            for (road, alpha) in [(&whole, share), (&narrow, (10.0 * share - 1.0) / 8.0)] {
+                let found = road.relief_of(&road.points(&[alpha; 240])).unwrap()[17][2];
+                assert!((found - wanted).abs() < 2e-3, "{share}: {found}");
+            }
+        }
+    }
+}
+
 /// A map of points on a grid of half a metre, slippery on the left half of the road over a quarter of the circle: the friction of the
 /// line through it from edge to edge, that of the whole road where no point is near, and what is refused.
 #[test]
@@ -304,7 +341,10 @@ fn friction_is_read_from_a_map() {
         read("survey = \"circle.csv\"\nfriction_map = \"told.csv\"\nfriction = 0.8").unwrap()
     );
     let at = |angle: f64| map[(angle / TAU * 120.0).round() as usize];
-    assert_eq!((at(0.8), at(1.6), at(4.0)), ([0.5, 1.0], [1.0; 2], [0.8; 2]));
+    assert_eq!((at(1.6), at(4.0)), ([1.0; 5], [0.8; 5]));
+    for (found, wanted) in at(0.8).iter().zip([1.0, 1.0, 0.75, 0.5, 0.5]) {
+        assert!((found - wanted).abs() < 0.04, "{:?}", at(0.8));
+    }
 
     file("far.csv", "1000,1000,0.5\n");
     file("half.csv", "100,0,0.5\n100,1\n");

@@ -2,7 +2,7 @@
 
 use super::circuit::{Circuit, Corner, Section};
 use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
-use super::relief::{LEVEL_AND_DRY, Relief, ReliefChange, Surface};
+use super::relief::{Relief, ReliefChange, SurfaceAcross};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 
@@ -22,8 +22,8 @@ pub(super) struct RoadFrame {
     pub left_m: f64,
     /// Distance to the right edge (m).
     pub right_m: f64,
-    /// Height (m) and banking (rad); zero on a level road.
-    pub relief: Surface,
+    /// Its surface.
+    pub surface: SurfaceAcross,
 }
 
 /// A road along a smooth reference line.
@@ -73,7 +73,7 @@ impl Road for Circuit {
             curvature_1pm: self.curvature_at(station_m),
             left_m,
             right_m,
-            relief: self.relief_at(station_m).unwrap_or(LEVEL_AND_DRY),
+            surface: self.relief_at(station_m).unwrap_or(SurfaceAcross::LEVEL_AND_DRY),
         }
     }
 
@@ -162,7 +162,7 @@ pub(super) fn circuit(road: &dyn Road) -> Result<(Circuit, Closure)> {
         let surfaces = circuit
             .station_m
             .iter()
-            .map(|station| road.frame(*station).relief);
+            .map(|station| road.frame(*station).surface);
         Relief::of(surfaces, change)
     });
     Ok((circuit, closure))

@@ -3,7 +3,7 @@
 use super::circuit::{Circuit, Corner, Section};
 use super::cross_sections::CrossSections;
 use super::cutting::cross_sections;
-use super::relief::{LEVEL_AND_DRY, ReliefChange};
+use super::relief::{ReliefChange, SurfaceAcross};
 use super::road::{Road, RoadFrame, circuit};
 use crate::{Error, Result};
 use glam::DVec2;
@@ -243,7 +243,7 @@ impl Road for Shaped {
                     curvature_1pm: way / radius,
                     left_m: 0.5 * (right_m - left_m).abs(),
                     right_m: 0.5 * (right_m - left_m).abs(),
-                    relief: LEVEL_AND_DRY,
+                    surface: SurfaceAcross::LEVEL_AND_DRY,
                 }
             }
             Shape::Ellipse {
@@ -262,7 +262,7 @@ impl Road for Shaped {
                     curvature_1pm: half_x_m * half_y_m / first.length().powi(3),
                     left_m: 0.5 * width_m,
                     right_m: 0.5 * width_m,
-                    relief: LEVEL_AND_DRY,
+                    surface: SurfaceAcross::LEVEL_AND_DRY,
                 }
             }
             Shape::Stadium {
@@ -286,7 +286,7 @@ impl Road for Shaped {
                     curvature_1pm,
                     left_m: 0.5 * width_m,
                     right_m: 0.5 * width_m,
-                    relief: LEVEL_AND_DRY,
+                    surface: SurfaceAcross::LEVEL_AND_DRY,
                 }
             }
         }

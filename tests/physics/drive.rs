@@ -7,7 +7,7 @@ use lapswarm::drive::{
     Course, Drive, DriverSettings, Line, Pose, Road, SpeedPlan, drive, drive_planned, look,
 };
 use lapswarm::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings};
-use lapswarm::track::{Circuit, CurvatureTable, Relief, ReliefChange, Track};
+use lapswarm::track::{Circuit, CurvatureTable, FrictionAcross, Relief, ReliefChange, Track};
 use lapswarm::vehicle::model::runge_kutta_step_on;
 use lapswarm::vehicle::wheels::moments_under;
 use lapswarm::vehicle::{Car, CarInput, CarModel, CarState};
@@ -44,7 +44,7 @@ fn banked(radius_m: f64, bank_rad: f64) -> Circuit {
     circuit.relief = Some(Relief {
         z_m: vec![0.0; n],
         bank_rad: vec![bank_rad; n],
-        friction: vec![[1.0, 0.0]; n],
+        friction: vec![FrictionAcross::DRY; n],
         change: ReliefChange::default(),
     });
     circuit
@@ -105,7 +105,7 @@ fn a_road_of_no_height_drives_as_a_level_one() {
     zero.relief = Some(Relief {
         z_m: vec![40.0; n],
         bank_rad: vec![0.0; n],
-        friction: vec![[1.0, 0.0]; n],
+        friction: vec![FrictionAcross::DRY; n],
         change: ReliefChange::default(),
     });
     let settings = DriverSettings {
@@ -125,11 +125,32 @@ fn a_road_of_no_height_drives_as_a_level_one() {
     }
 }
 
+/// The front wheels of a driven car turn no faster than its file allows.
+#[test]
+fn a_driver_turns_the_wheels_no_faster_than_the_car_allows() {
+    let circuit = circuit("stadium:200:70:14");
+    let settings = DriverSettings {
+        pace: 0.5,
+        ..DriverSettings::default()
+    };
+    let fastest = |rate_radps: f64| {
+        let mut car = bundled_car();
+        car.max_steer_rate_radps = rate_radps;
+        let drive = drive(&car, &circuit, &settings, 0.05).expect("it gets round");
+        let turned = drive.inputs.windows(2);
+        let rates = turned.map(|pair| (pair[1].steer - pair[0].steer).abs() / 0.05);
+        rates.fold(0.0, f64::max)
+    };
+    let (usual, slow) = (fastest(0.7), fastest(0.03));
+    assert!(usual > 0.04, "{usual} rad/s");
+    assert!((0.029..0.03 + 1e-9).contains(&slow), "{slow} rad/s");
+}
+
 /// A circle of 100 m, driven to the left, of this friction on its middle that gains so much per metre to the left.
 fn slippery(friction: [f64; 2]) -> Circuit {
     let mut circuit = banked(100.0, 0.0);
     let relief = circuit.relief.as_mut().expect("a surface");
-    relief.friction.fill(friction);
+    relief.friction.fill(FrictionAcross::linear(friction, [6.0; 2]));
     circuit
 }
 

@@ -8,7 +8,7 @@ use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
 use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadEdges, TERMS};
 use crate::optimum::{ReferenceSolvers, mended};
 use crate::study::framework::Plan;
-use crate::track::{CrossSections, Surface, Track, racetrack_csv};
+use crate::track::{CrossSections, Track, racetrack_csv};
 use crate::vehicle::limits::{SpeedRange, car_envelope, car_envelope_under_loads};
 use crate::vehicle::powertrain::Powertrain;
 use crate::vehicle::{Car, Envelope};
@@ -270,10 +270,8 @@ impl Setup {
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], fine.closed);
         let abreast = edges.abreast(&fine.points_m);
         let given = (0..n).filter(|&i| fine.section[i].1 == 0.0);
-        let relief = fine.relief.as_ref().map(|relief| -> Vec<Surface> {
-            let own = (0..n).filter(|&i| fine.section[i].1 == 0.0);
-            own.map(|i| relief.surface[i]).collect()
-        });
+        let points: Vec<DVec2> = given.clone().map(|i| fine.points_m[i]).collect();
+        let relief = self.cross_sections.relief_across_of(&points);
         let rows = given.map(|i| {
             let (before, after) = if fine.closed {
                 ((i + n - 1) % n, (i + 1) % n)

@@ -284,7 +284,8 @@ fn run_stages(
             envelope: None,
             ..line.clone()
         };
-        let inputs = (alike, &road.cross_sections, road.car.envelope.figures());
+        let car = (road.car.envelope.figures(), road.car.curvature_rate());
+        let inputs = (alike, &road.cross_sections, car);
         let stage = (1 + 2 * round, format!("line {round}"));
         let (at, found) = going.stage::<Raceline>(stage, &inputs, &line, &road)?;
         let line_path = at.join("line_fastest.csv");
@@ -304,14 +305,14 @@ fn run_stages(
         let mut road = road;
         road.car.envelope = whole.clone();
         let driven = transient::Prepared {
-            car: car.clone(),
+            car: drive.read_car()?,
             road,
             lines: vec![fastest],
             motor: None,
         };
         let (line, road) = (&driven.lines[0], &driven.road);
         let inputs = (
-            &car,
+            &driven.car,
             drive.car_width_m,
             whole.figures(),
             &road.edges_m,
@@ -339,6 +340,7 @@ fn run_stages(
             envelope: driven_within,
             line: last_line,
             car_width_m: settings.raceline.car_width_m,
+            steering_rate_deg_s: settings.raceline.steering_rate_deg_s,
             seed: settings.raceline.seed,
             backend: settings.raceline.backend,
             adapter: settings.raceline.adapter.clone(),

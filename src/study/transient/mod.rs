@@ -251,7 +251,7 @@ impl Study for Transient {
 
 /// Reads car, lines and track. What is least work comes first, so that a mistake shows at once.
 fn read(settings: &TransientSettings) -> Result<Prepared> {
-    let car = Car::load(&settings.car)?;
+    let car = settings.read_car()?;
     settings.free(&car)?;
     let files = &settings.line;
     let points = files

@@ -29,7 +29,7 @@ settings! {
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
             "Width of the car, all of which stays within the edges";
         steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
-            "Fastest turn of the front wheels that the driver's plan counts on; without it the car's own";
+            "Fastest turn of the front wheels; without it the car's own";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
             "Shares of the envelope's grip to drive with; without it from 0.3 on for one line alone and from 0.8 on for a population";
         deployment: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap_swarm.csv\""),
@@ -123,6 +123,18 @@ impl TransientSettings {
             return refuse("backend", "another one for one line and no set-ups", expected);
         }
         Ok(())
+    }
+
+    /// Reads the car, whose wheels turn as fast as is asked for.
+    ///
+    /// # Errors
+    /// Those of [`Car::load`].
+    pub fn read_car(&self) -> Result<Car> {
+        let mut car = Car::load(&self.car)?;
+        if let Some(rate_deg_s) = self.steering_rate_deg_s {
+            car.max_steer_rate_radps = rate_deg_s.to_radians();
+        }
+        Ok(car)
     }
 
     /// What the circuit and the limits are set up from.

@@ -1,6 +1,7 @@
 //! Surveys in columns of numbers.
 
-use super::super::relief::{FRICTION_COLUMNS, FRICTIONS, HEIGHTS_M, STEEPEST_BANK_DEG, friction_columns};
+use super::super::friction::{FRICTION_COLUMNS, FRICTION_NAMES, FRICTIONS, FrictionColumns};
+use super::super::relief::{HEIGHTS_M, STEEPEST_BANK_DEG};
 use super::check::FURTHEST_M;
 use super::geographic::{self, Fix};
 use super::{MOST_POINTS, Raw, WIDEST_M};
@@ -38,11 +39,11 @@ enum Column {
     Height,
     Bank,
     Friction,
-    LeftFriction,
-    RightFriction,
+    /// Of a place of [`FRICTION_NAMES`].
+    FrictionAt(usize),
 }
 
-const NAMES: [(&str, Column); 23] = [
+const NAMES: [(&str, Column); 26] = [
     ("x_m", Column::X),
     ("y_m", Column::Y),
     ("latitude_deg", Column::Latitude),
@@ -64,8 +65,11 @@ const NAMES: [(&str, Column); 23] = [
     ("z_m", Column::Height),
     ("bank_deg", Column::Bank),
     ("friction", Column::Friction),
-    ("friction_left", Column::LeftFriction),
-    ("friction_right", Column::RightFriction),
+    (FRICTION_NAMES[0], Column::FrictionAt(0)),
+    (FRICTION_NAMES[1], Column::FrictionAt(1)),
+    (FRICTION_NAMES[2], Column::FrictionAt(2)),
+    (FRICTION_NAMES[3], Column::FrictionAt(3)),
+    (FRICTION_NAMES[4], Column::FrictionAt(4)),
 ];
 
 /// The name of a column as the header spells it, shortened for messages.
@@ -160,14 +164,10 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
         .both(Column::LeftX, Column::LeftY)
         .zip(table.both(Column::RightX, Column::RightY));
     if let Some((left, right)) = edges {
-        let surface = [
-            Column::Height,
-            Column::Bank,
-            Column::Friction,
-            Column::LeftFriction,
-            Column::RightFriction,
-        ];
-        if let Some(at) = surface.iter().find_map(|column| table.index(*column)) {
+        let surface = [Column::Height, Column::Bank, Column::Friction];
+        let across = (0..FRICTION_NAMES.len()).map(Column::FrictionAt);
+        let mut surface = surface.into_iter().chain(across);
+        if let Some(at) = surface.find_map(|column| table.index(column)) {
             return Err(Error::input(
                 path,
                 Place::from("header").named(format!("column {}", at + 1)),
@@ -249,10 +249,9 @@ fn read_line<'a>(
     let sides = table.both(Column::LeftWidth, Column::RightWidth);
     let whole = table.index(Column::Width);
     let (height, bank) = (table.index(Column::Height), table.index(Column::Bank));
-    let frictions = friction_columns(
-        [Column::Friction, Column::LeftFriction, Column::RightFriction].map(|column| table.index(column)),
-    )
-    .map_err(|found| Error::input(table.path, "header", found, FRICTION_COLUMNS))?;
+    let across = std::array::from_fn(|k| table.index(Column::FrictionAt(k)));
+    let frictions = FrictionColumns::of(table.index(Column::Friction), across)
+        .map_err(|found| Error::input(table.path, "header", found, FRICTION_COLUMNS))?;
     let mut raw = Raw::default();
     let mut fixes = Vec::new();
     let (mut left, mut right) = (Vec::new(), Vec::new());
@@ -280,9 +279,9 @@ fn read_line<'a>(
             raw.bank_deg
                 .push(cell(bank, -STEEPEST_BANK_DEG, STEEPEST_BANK_DEG)?);
         }
-        if let Some(edges) = frictions {
-            let at = |edge: usize| cell(edge, FRICTIONS.0, FRICTIONS.1);
-            raw.friction.push([at(edges[0])?, at(edges[1])?]);
+        if let Some(columns) = frictions {
+            let at = |column: usize| cell(column, FRICTIONS.0, FRICTIONS.1);
+            raw.friction.push(columns.read(at)?);
         }
         if let Some([l, r]) = sides {
             left.push(cell(l, 0.0, WIDEST_M)?);

@@ -9,8 +9,9 @@
 //! - GPX (`trk` or `rte`) and KML (`LineString`, `LinearRing` or `gx:Track`);
 //! - a telemetry log with GPS, of which one lap becomes the line.
 //!
-//! Tables of lines may have a height, `z_m`, a banking, `bank_deg`, and a friction, `friction` or `friction_left` and
-//! `friction_right`, as a share of what the car's tyres have (1 where it is dry); GPX and KML have heights where all their points do.
+//! Tables of lines may have a height, `z_m`, a banking, `bank_deg`, and a friction as a share of what the car's tyres have (1 where it is
+//! dry): `friction`, or `friction_left` and `friction_right`, or these and `friction_25`, `friction_50` and `friction_75` at so many
+//! percent of the width from the right edge. GPX and KML have heights where all their points do.
 //!
 //! Geographic coordinates are projected onto the plane that touches the WGS 84 ellipsoid at the middle of the line.
 
@@ -26,6 +27,7 @@ mod tests;
 mod xml;
 
 use super::circuit::{Corner, Section};
+use super::friction::FRICTION_PLACES;
 use super::relief::Given;
 use crate::config::read_bytes;
 use crate::{Error, Place, Result};
@@ -83,8 +85,9 @@ pub struct Survey {
     pub z_m: Vec<f64>,
     /// Banking at each point (degrees about the direction of driving, the left side up); empty where it is not known.
     pub bank_deg: Vec<f64>,
-    /// Friction at the left and the right edge beside each point, as a share of the car's own; empty where it is not known.
-    pub friction: Vec<[f64; 2]>,
+    /// Friction from the right edge to the left beside each point, as [`FrictionAcross::of`](super::FrictionAcross::of); empty where it
+    /// is not known.
+    pub friction: Vec<[f64; FRICTION_PLACES]>,
     /// Gap in height between end and start of a closed line, which is spread over its length already (m).
     pub height_gap_m: f64,
 }
@@ -99,8 +102,8 @@ struct Raw {
     /// Heights (m) and banking (degrees), as many as points, or none.
     z_m: Vec<f64>,
     bank_deg: Vec<f64>,
-    /// Friction at the left and the right edge, likewise.
-    friction: Vec<[f64; 2]>,
+    /// Friction from the right edge to the left, likewise.
+    friction: Vec<[f64; FRICTION_PLACES]>,
     name: Option<String>,
 }
 

@@ -66,7 +66,9 @@ impl DeviceSection {
         // Height, banking and friction stand behind all of them.
         let relief = plan.relief.iter().map(|row| Self {
             weights: [row.step_rise, row.across_rise, row.sin, row.cos],
-            step: [row.friction, row.across_friction],
+            sources: row.friction_rises.map(f32::to_bits),
+            step: [row.friction_from, row.friction_across],
+            constant: row.friction,
             ..Self::zeroed()
         });
         sections.extend(relief);
