@@ -4,7 +4,6 @@
 // A driver's figures; twin of `DriverTable`.
 struct Driver {
     step: f32,
-    preview: f32,
     heading_gain: f32,
     speed_gain: f32,
     slip_limit: f32,
@@ -12,12 +11,7 @@ struct Driver {
     max_steer: f32,
     steer_rate: f32,
     knows: f32,
-    rear_slip_per_ay: f32,
-    rear_slip_steep: f32,
-    friction: f32,
     run_off: f32,
-    understeer_per_ay: f32,
-    understeer_steep: f32,
     driven_share: f32,
     steer_lag: f32,
     pedal_lag: f32,
@@ -29,8 +23,12 @@ struct Driver {
 }
 
 @group(0) @binding(7) var<uniform> driver: Driver;
-// Speed at the start of a stretch, torque there, slope.
-@group(0) @binding(8) var<uniform> torque: array<vec4<f32>, STRETCHES>;
+// Rows of the map of the car's steady cornering, and steps of the share of the grip; see `src/drive/cornering.rs`.
+const SPEEDS = 8u;
+const SHARES = 8u;
+// Speed at the start of a stretch, torque there, slope. Behind the stretches stand the places of the map: steering beyond the geometry's,
+// slip angle of the rear axle, friction, and by how much steering is ahead of a bend.
+@group(0) @binding(8) var<uniform> torque: array<vec4<f32>, STRETCHES + SPEEDS * (SHARES + 1u)>;
 
 fn torque_at(speed: f32) -> f32 {
     var found = 0.0;
@@ -76,9 +74,32 @@ fn planned_speed(course: Course, pace: Pace, view: View, ahead: f32) -> f32 {
     return speed + pace.share * (faster - speed);
 }
 
-fn steep(share: f32) -> f32 {
-    let square = min(share * share, 1.0);
-    return square * square;
+// A speed in the map: the row below it, a whole number, and the share of the way to the next.
+struct SpeedPlace {
+    row: f32,
+    share: f32,
+}
+
+fn speed_place(speed: f32) -> SpeedPlace {
+    let rows = (speed - 10.0) * 0.1;
+    let row = whole(rows, f32(SPEEDS - 2u));
+    return SpeedPlace(row, min(max(rows - row, 0.0), 1.0));
+}
+
+// The four figures of a place of the map at this speed.
+fn cornering_at(speed: SpeedPlace, column: f32) -> vec4<f32> {
+    let at = STRETCHES + place_of_number(speed.row * f32(SHARES + 1u) + column);
+    let below = torque[at];
+    return below + speed.share * (torque[at + SHARES + 1u] - below);
+}
+
+// Steering beyond the geometry's and the slip angle of the rear axle at a share of the grip.
+fn cornering_angles(speed: SpeedPlace, share: f32) -> vec2<f32> {
+    let used = min(abs(share), 1.1) * f32(SHARES);
+    let column = whole(used, f32(SHARES - 1u));
+    let below = cornering_at(speed, column).xy;
+    let angles = below + (used - column) * (cornering_at(speed, column + 1.0).xy - below);
+    return select(angles, -angles, share < 0.0);
 }
 
 fn act(
@@ -95,10 +116,19 @@ fn act(
     let wheelbase = c.cg_to_front + c.cg_to_rear;
     let aero = aero_forces(c, v, view.row.flap);
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
-    let grip = under.friction * driver.friction * weight / c.mass;
-    let curvature = curvature_ahead(course, view.pose, driver.preview * v);
+    let speed = speed_place(v);
+    let known = cornering_at(speed, 0.0);
+    let preview = known.w;
+    let grip = under.friction * known.z * weight / c.mass;
+    let behind = planned_speed(course, pace, view, driver.speed_ahead * v) - body.vx;
+    let look = driver.plan_ahead * v;
+    let before = planned_speed(course, pace, view, look - driver.reach);
+    let after = planned_speed(course, pace, view, look + driver.reach);
+    let planned = (after * after - before * before) / 8.0;
+    let curvature = curvature_ahead(course, view.pose, preview * v);
     let bend = view.bend;
-    var across_ahead = curvature * v * v;
+    let speed_ahead = max(v + planned * preview, 3.0);
+    var across_ahead = curvature * speed_ahead * speed_ahead;
     var across = bend * v * v;
     var turning = body.yaw_rate * v;
     if HAS_RELIEF {
@@ -106,8 +136,8 @@ fn act(
         across = across + under.lean;
         turning = turning + under.lean;
     }
-    let understeer = across_ahead * (driver.understeer_per_ay + driver.understeer_steep * steep(across_ahead / grip));
-    let rear_slip = across * (driver.rear_slip_per_ay + driver.rear_slip_steep * steep(across / grip));
+    let understeer = under.friction * cornering_angles(speed, across_ahead / grip).x;
+    let rear_slip = under.friction * cornering_angles(speed, across / grip).y;
     let sideslip = driver.knows * (c.cg_to_rear * bend - rear_slip);
     let heading = view.heading_error + sideslip + view.offset * 0.9 / (v * 0.45 + 3.0);
     let yaw_lack = curvature_ahead(course, view.pose, 0.08 * v) * v - body.yaw_rate;
@@ -115,17 +145,12 @@ fn act(
     let steer = min(max(asked, -driver.max_steer), driver.max_steer);
     let rate = min(max((steer - controls.steer) / driver.steer_lag, -driver.steer_rate), driver.steer_rate);
 
-    let behind = planned_speed(course, pace, view, driver.speed_ahead * v) - body.vx;
-    let ahead = driver.plan_ahead * v;
-    let before = planned_speed(course, pace, view, ahead - driver.reach);
-    let after = planned_speed(course, pace, view, ahead + driver.reach);
-    let planned = (after * after - before * before) / 8.0;
     let wanted = planned + driver.speed_gain * behind;
     var force = c.mass * wanted + aero.drag;
     if HAS_RELIEF {
         force = force + c.mass * under.climb;
     }
-    let used = min(driver.knows * abs(turning / grip), 1.0);
+    let used = min(driver.knows * abs(0.5 * (turning + across) / grip), 1.0);
     let left = sqrt(max(1.0 - used * used, 0.01));
     let limit = under.friction * driver.slip_limit * left;
     let stiffness = driver.driven_share * weight * driver.slip_stiffness;

@@ -186,7 +186,8 @@ fn crossing(section: u32, candidate: u32) -> vec4<f32> {
     let share = alpha(section, variables_of(section, candidate));
     let relief = sections[stretch.sections + section];
     let steps = vec4<f32>(relief.step.x + share * relief.step.y) - vec4<f32>(0.0, 1.0, 2.0, 3.0);
-    let friction = relief.constant + dot(saturate(steps), bitcast<vec4<f32>>(relief.sources));
+    let rises = min(max(steps, vec4<f32>(0.0)), vec4<f32>(1.0)) * bitcast<vec4<f32>>(relief.sources);
+    let friction = relief.constant + rises.x + rises.y + rises.z + rises.w;
     return vec4<f32>(share * sections[section].across, share * relief.weights.y, friction);
 }
 

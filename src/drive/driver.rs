@@ -1,5 +1,6 @@
 //! The driver: steering by preview and feedback, drive and brake by limited wheel slip. Twin of `shaders/driver.wgsl`.
 
+use super::cornering::{CorneringMap, SpeedPlace};
 use super::path::{View, curvature_ahead};
 use super::relief::Footing;
 use super::road::{Course, FRONT_CELLS, PLAN_REACH_M, Road};
@@ -15,10 +16,10 @@ use std::f64::consts::TAU;
 /// Time constant with which wheel slip follows the pedals, s.
 pub(super) const PEDAL_LAG_S: f64 = 0.06;
 /// Time constant of the driver's arms, s.
-const STEER_LAG: f64 = 0.04;
+pub(super) const STEER_LAG_S: f64 = 0.04;
 /// Greatest rate at which a driver's arms turn the front wheels, rad/s; a car may have slower steering.
 const STEER_RATE: f64 = 0.9;
-/// Steering that a driver who does not know the car adds for understeer, rad per g and metre of wheelbase.
+/// Steering that a driver who does not know the car adds for understeer where the tyres hold what they carry, rad per metre of wheelbase.
 const UNDERSTEER: f64 = 0.0025;
 /// Share of the load that the driven wheels are computed to carry.
 const DRIVEN_SHARE: f64 = 0.55;
@@ -55,8 +56,6 @@ macro_rules! driver_table {
 driver_table! {
     /// Integration step of the closed loop, s.
     step,
-    /// How far ahead the driver looks, s.
-    preview,
     /// How much the driver steers against an angle to the path, rad per rad.
     heading_gain,
     /// Acceleration for every m/s that the plan is ahead, 1/s.
@@ -71,18 +70,8 @@ driver_table! {
     steer_rate,
     /// One for a driver who knows the car, zero for one who does not.
     knows,
-    /// Slip angle of the rear axle for every m/s^2 of lateral acceleration, rad s^2/m,
-    rear_slip_per_ay,
-    /// and what comes to it at the limit of grip, with the fourth power of the share that is used.
-    rear_slip_steep,
-    /// Lateral acceleration that the tyres give for every m/s^2 of load over mass.
-    friction,
     /// Distance beyond an edge at which a car counts as lost, m.
     run_off,
-    /// Steering added for understeer for every m/s^2 of lateral acceleration, rad s^2/m,
-    understeer_per_ay,
-    /// and what comes to it at the limit, likewise.
-    understeer_steep,
     /// Share of the load that the driven wheels are computed to carry. This figure and those below are constants. They are passed
     /// as data because compilers for devices would regroup known constants.
     driven_share,
@@ -105,29 +94,18 @@ driver_table! {
 impl DriverTable<f64> {
     /// The figures of `settings` in `car`, driven in steps of `step_s`; a car is lost `run_off_m` beyond an edge.
     pub fn new(settings: &DriverSettings, car: &Car, step_s: f64, run_off_m: f64) -> Self {
-        let knowledge = settings.knowledge;
-        let c = &car.chassis;
-        let guess = UNDERSTEER * (c.cg_to_front + c.cg_to_rear) / c.gravity;
-        let understeer = knowledge.map_or([guess, 0.0], |k| k.understeer);
-        let rear_slip = knowledge.map_or([0.0; 2], |k| k.rear_slip);
         Self {
             step: step_s,
-            preview: settings.preview_s,
             heading_gain: settings.heading_gain,
             speed_gain: settings.speed_gain_1ps,
             slip_limit: settings.slip_limit,
             slip_stiffness: settings.slip_stiffness,
             max_steer: car.max_steer_rad,
             steer_rate: car.max_steer_rate_radps.min(STEER_RATE),
-            knows: knowledge.map_or(0.0, |_| 1.0),
-            rear_slip_per_ay: rear_slip[0],
-            rear_slip_steep: rear_slip[1],
-            friction: knowledge.map_or(1.0, |k| k.friction),
+            knows: f64::from(u8::from(settings.knowledge.is_some())),
             run_off: run_off_m,
-            understeer_per_ay: understeer[0],
-            understeer_steep: understeer[1],
             driven_share: DRIVEN_SHARE,
-            steer_lag: STEER_LAG,
+            steer_lag: STEER_LAG_S,
             pedal_lag: PEDAL_LAG_S,
             reach: PLAN_REACH_M,
             rolling: car.rolling_mps2(),
@@ -136,6 +114,13 @@ impl DriverTable<f64> {
             plan_ahead: settings.plan_ahead_s,
         }
     }
+}
+
+/// What the driver takes the car's steady cornering for.
+pub fn cornering_of(settings: &DriverSettings, car: &Car) -> CorneringMap<f64> {
+    let guess = UNDERSTEER * (car.chassis.cg_to_front + car.chassis.cg_to_rear);
+    let knowledge = settings.knowledge.clone();
+    knowledge.unwrap_or_else(|| CorneringMap::guessed(guess, settings.preview_s))
 }
 
 /// The torque that a powertrain gives the driven wheels over their speed, in the gear that gives most: in stretches, each
@@ -322,18 +307,11 @@ pub fn planned_speed<R: Lookup>(
     speed + pace.share * (faster - speed)
 }
 
-/// How steeply slip rises towards the limit: the fourth power of the share of the grip that is used.
-#[inline(always)]
-fn steep<R: Real>(share: R) -> R {
-    let square = (share * share).min(R::lit(1.0));
-    square * square
-}
-
 /// Moves arms and feet for one step.
 #[inline(always)]
 pub fn act<R: Lookup>(
     driver: &DriverTable<R::Storage>,
-    torque: &WheelTorque<R::Storage>,
+    (torque, cornering): (&WheelTorque<R::Storage>, &CorneringMap<R::Storage>),
     road: &Road<R::Storage>,
     (course, pace): (&Course<R>, &Pace<R>),
     c: &Chassis<R>,
@@ -352,12 +330,22 @@ pub fn act<R: Lookup>(
     let aero = aero_forces(c, v, view.row.flap);
     let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
     let friction = footing.map_or(one, |footing| footing.friction);
-    let grip = friction * R::load(driver.friction) * weight / c.mass;
+    let speed = SpeedPlace::of(v);
+    let [own_friction, preview] = speed.limits(cornering);
+    let grip = friction * own_friction * weight / c.mass;
+    let behind = planned_speed(road, course, pace, view, R::load(driver.speed_ahead) * v) - body.vx;
+    let look = R::load(driver.plan_ahead) * v;
+    let reach = R::load(driver.reach);
+    let before = planned_speed(road, course, pace, view, look - reach);
+    let after = planned_speed(road, course, pace, view, look + reach);
+    let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     // Feed-forward: geometry plus the slip of both axles in steady cornering; feedback: offset, heading and the yaw rate that the
     // present curvature asks for.
-    let curvature = curvature_ahead(path, course, pose, R::load(driver.preview) * v);
+    let curvature = curvature_ahead(path, course, pose, preview * v);
     let bend = view.bend;
-    let mut across_ahead = curvature * v * v;
+    // The speed that he will have there.
+    let speed_ahead = (v + planned * preview).max(R::lit(LEAST_SPEED));
+    let mut across_ahead = curvature * speed_ahead * speed_ahead;
     let mut across = bend * v * v;
     let mut turning = body.yaw_rate * v;
     // On a banked road the tyres bear gravity's part too. The driver knows it, and the gradient, from the road under him.
@@ -366,10 +354,10 @@ pub fn act<R: Lookup>(
         across = across + footing.lean;
         turning = turning + footing.lean;
     }
-    let understeer = across_ahead
-        * (R::load(driver.understeer_per_ay) + R::load(driver.understeer_steep) * steep(across_ahead / grip));
-    let rear_slip =
-        across * (R::load(driver.rear_slip_per_ay) + R::load(driver.rear_slip_steep) * steep(across / grip));
+    // On a slippery road tyres slip less before they let go.
+    let [understeer, _] = speed.angles(cornering, across_ahead / grip);
+    let [_, rear_slip] = speed.angles(cornering, across / grip);
+    let (understeer, rear_slip) = (friction * understeer, friction * rear_slip);
     let sideslip = knows * (c.cg_to_rear * bend - rear_slip);
     let heading =
         view.heading_error + sideslip + view.offset * R::lit(0.9) / (v * R::lit(0.45) + R::lit(3.0));
@@ -383,19 +371,13 @@ pub fn act<R: Lookup>(
         .max(-fastest)
         .min(fastest);
 
-    let behind = planned_speed(road, course, pace, view, R::load(driver.speed_ahead) * v) - body.vx;
-    let look = R::load(driver.plan_ahead) * v;
-    let reach = R::load(driver.reach);
-    let before = planned_speed(road, course, pace, view, look - reach);
-    let after = planned_speed(road, course, pace, view, look + reach);
-    let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
     let wanted = planned + R::load(driver.speed_gain) * behind;
     let mut force = c.mass * wanted + aero.drag;
     if let Some(footing) = footing {
         force = force + c.mass * footing.climb;
     }
-    // What a bend leaves of the tyres, by the friction circle.
-    let used = knows * (turning / grip).abs();
+    // What a bend leaves of the tyres, by the friction circle: a bend between the path's and the one that the car turns.
+    let used = knows * (R::lit(0.5) * (turning + across) / grip).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();
     let limit = friction * R::load(driver.slip_limit) * left;

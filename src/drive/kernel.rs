@@ -1,5 +1,6 @@
 //! One step of the closed loop, and a lap of them: look, judge, act, move. Twin of `shaders/drive.wgsl`.
 
+use super::cornering::CorneringMap;
 use super::driver::{Controls, DriverTable, Pace, WheelTorque, act, car_input, planned_speed};
 use super::path::{Pose, View, look};
 use super::relief::{Footing, footing};
@@ -37,6 +38,8 @@ pub struct World<'a, S> {
     pub driver: &'a DriverTable<S>,
     /// What the powertrain gives.
     pub torque: &'a WheelTorque<S>,
+    /// What the driver takes the car's steady cornering for.
+    pub cornering: &'a CorneringMap<S>,
 }
 
 /// A lap under way.
@@ -230,7 +233,7 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
     };
     let mut controls = act(
         driver,
-        world.torque,
+        (world.torque, world.cornering),
         road,
         (course, pace),
         &car.chassis,

@@ -1,6 +1,6 @@
 //! One lap, driven in `f64` and recorded.
 
-use super::driver::{DriverTable, Pace, WheelTorque};
+use super::driver::{DriverTable, Pace, WheelTorque, cornering_of};
 use super::kernel::{DriveState, World, drive_step, ending};
 use super::plan::SpeedPlan;
 use super::road::{Course, Line, Road};
@@ -141,6 +141,7 @@ pub fn drive_until_lost(
         road: &road,
         driver: &DriverTable::new(settings, car, STEP, 0.0),
         torque: &WheelTorque::of_car(car)?,
+        cornering: &cornering_of(settings, car),
     };
     let flat = car.to_flat();
     Ok(match car.tyre_model() {

@@ -189,7 +189,7 @@ impl Road<f64> {
             }
             road.rows_ahead = road
                 .rows_ahead
-                .max((ahead_m(driver.preview_s.max(0.08)) / spacing) as usize + 2);
+                .max((ahead_m(driver.furthest_s()) / spacing) as usize + 2);
             road.cells_ahead = road.cells_ahead.max(
                 ((ahead_m(driver.plan_ahead_s.max(driver.speed_ahead_s)) + PLAN_REACH_M) / cell_m) as usize
                     + FRONT_CELLS

@@ -243,6 +243,7 @@ fn trail<R: Lookup>(
         road: &road,
         driver: &problem.driver().stored::<R>(),
         torque: &problem.torque().stored::<R>(),
+        cornering: &problem.cornering().stored::<R>(),
     };
     let [line, plan, share] = problem.lap_figures(candidate).map(R::lit);
     let course = Course::at(&road, line);

@@ -3,6 +3,6 @@
 mod lap;
 mod sensors;
 
-pub use crate::drive::{CarKnowledge, Drive, DriverSettings, SpeedPlan, drive, drive_planned};
+pub use crate::drive::{CorneringMap, Drive, DriverSettings, SpeedPlan, drive, drive_planned};
 pub use lap::{SimulateSettings, Simulated, simulate_lap};
 pub use sensors::{SensorSettings, distort};

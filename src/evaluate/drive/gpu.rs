@@ -55,7 +55,9 @@ impl DeviceKernel<DriveProblem> for DriveDevice {
         };
         let storage =
             |label: &str, data: &[f32]| context.table(label, bytemuck::cast_slice(data), Usage::STORAGE);
-        let stretches: Vec<[f32; 4]> = torque.stretches.iter().map(|s| [s[0], s[1], s[2], 0.0]).collect();
+        let stretches = torque.stretches.iter().flat_map(|s| [s[0], s[1], s[2], 0.0]);
+        let cornering = drive.cornering().stored::<f32>();
+        let known: Vec<f32> = stretches.chain(cornering.figures).collect();
         let driver = drive.driver().stored::<f32>().to_row();
         use Binding::{Read, Uniform};
         let tables = vec![
@@ -71,7 +73,7 @@ impl DeviceKernel<DriveProblem> for DriveDevice {
             ),
             (
                 Uniform,
-                context.buffer_of("torque", bytemuck::cast_slice(&stretches), Usage::UNIFORM)?,
+                context.buffer_of("torque", bytemuck::cast_slice(&known), Usage::UNIFORM)?,
             ),
         ];
         let kernel = TrajectoryKernel {

@@ -1,7 +1,8 @@
 //! Problems of closed-loop laps: which parameters of the car are free, which lines and plans are to be chosen from, and the
 //! objectives.
 
-use crate::drive::driver::{DriverTable, WheelTorque};
+use crate::drive::CorneringMap;
+use crate::drive::driver::{DriverTable, WheelTorque, cornering_of};
 use crate::drive::kernel::{DriveState, DrivenLap, World};
 use crate::drive::{DriverSettings, Line, Road};
 use crate::error::{Error, Result};
@@ -72,6 +73,7 @@ pub struct DriveProblem {
     road: Road<f64>,
     driver: DriverTable<f64>,
     torque: WheelTorque<f64>,
+    cornering: CorneringMap<f64>,
     lines: usize,
     shares: Vec<f64>,
     pub(super) objectives: Vec<DriveObjective>,
@@ -113,6 +115,7 @@ impl DriveProblem {
         let road = Road::new(lines, &settings.driver, settings.step_s)?;
         let driver = DriverTable::new(&settings.driver, &car, settings.step_s, settings.run_off_m);
         let torque = WheelTorque::of_car(&car)?;
+        let cornering = cornering_of(&settings.driver, &car);
         let (free, mut variables) = FreeCar::new(car, free)?;
         if lines.len() > 1 {
             variables.push(Variable::whole("line", "-", 0, lines.len() as i32 - 1));
@@ -130,6 +133,7 @@ impl DriveProblem {
             road,
             driver,
             torque,
+            cornering,
             lines: lines.len(),
             shares: shares.to_vec(),
             objectives: objectives.to_vec(),
@@ -161,12 +165,18 @@ impl DriveProblem {
         &self.torque
     }
 
+    /// What the driver takes the car's steady cornering for.
+    pub fn cornering(&self) -> &CorneringMap<f64> {
+        &self.cornering
+    }
+
     /// What laps in `f64` share.
     pub fn world(&self) -> World<'_, f64> {
         World {
             road: &self.road,
             driver: &self.driver,
             torque: &self.torque,
+            cornering: &self.cornering,
         }
     }
 

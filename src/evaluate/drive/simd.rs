@@ -1,6 +1,7 @@
 //! The lane backend: `f32`, as many laps at once as a register holds, threads by rayon.
 
 use super::problem::{DriveProblem, LAP_FIGURES};
+use crate::drive::CorneringMap;
 use crate::drive::driver::{DriverTable, Pace, WheelTorque};
 use crate::drive::kernel::{DriveState, DrivenLap, STATE, World, drive_on};
 use crate::drive::{Course, Road};
@@ -17,6 +18,7 @@ pub struct DriveLanes {
     road: Road<f32>,
     driver: DriverTable<f32>,
     torque: WheelTorque<f32>,
+    cornering: CorneringMap<f32>,
 }
 
 struct Kernel<'a> {
@@ -41,6 +43,7 @@ impl Kernel<'_> {
             road: &tables.road,
             driver: &tables.driver,
             torque: &tables.torque,
+            cornering: &tables.cornering,
         };
         let course = Course::at(world.road, line);
         let pace = Pace { plan, share };
@@ -100,6 +103,7 @@ impl LaneTables<DriveProblem> for DriveLanes {
             road: drive.road().stored::<f32>(),
             driver: drive.driver().stored::<f32>(),
             torque: drive.torque().stored::<f32>(),
+            cornering: drive.cornering().stored::<f32>(),
         }
     }
 
