@@ -127,7 +127,7 @@ fn act(
     let planned = (after * after - before * before) / 8.0;
     let curvature = curvature_ahead(course, view.pose, preview * v);
     let bend = view.bend;
-    let speed_ahead = max(v + planned * preview, 3.0);
+    let speed_ahead = max(v + driver.knows * planned * preview, 3.0);
     var across_ahead = curvature * speed_ahead * speed_ahead;
     var across = bend * v * v;
     var turning = body.yaw_rate * v;
@@ -136,8 +136,9 @@ fn act(
         across = across + under.lean;
         turning = turning + under.lean;
     }
-    let understeer = under.friction * cornering_angles(speed, across_ahead / grip).x;
-    let rear_slip = under.friction * cornering_angles(speed, across / grip).y;
+    let held = driver.knows * grip + (1.0 - driver.knows) * (under.friction * 19.6133);
+    let understeer = under.friction * cornering_angles(speed, across_ahead / held).x;
+    let rear_slip = under.friction * cornering_angles(speed, across / held).y;
     let sideslip = driver.knows * (c.cg_to_rear * bend - rear_slip);
     let heading = view.heading_error + sideslip + view.offset * 0.9 / (v * 0.45 + 3.0);
     let yaw_lack = curvature_ahead(course, view.pose, 0.08 * v) * v - body.yaw_rate;

@@ -59,7 +59,7 @@ impl CorneringMap<f64> {
     }
 
     /// What a driver takes for granted who does not know the car: steering in proportion to the share of the grip, so much at all
-    /// of it (rad) and so far ahead (s), of tyres that hold what they carry.
+    /// of it (rad) and so far ahead (s).
     pub fn guessed(steer_rad: f64, preview_s: f64) -> Self {
         let place = |k: usize| [steer_rad * k as f64 / SHARES as f64, 0.0, 1.0, preview_s];
         let row: Vec<f64> = (0..=SHARES).flat_map(place).collect();

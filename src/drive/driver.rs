@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::scalar::{Lookup, Real};
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::model::wheel_speeds;
-use crate::vehicle::powertrain::Powertrain;
+use crate::vehicle::powertrain::{GRAVITY_MPS2, Powertrain};
 use crate::vehicle::{Car, CarInput, CarState, Chassis};
 use std::f64::consts::TAU;
 
@@ -19,8 +19,10 @@ pub(super) const PEDAL_LAG_S: f64 = 0.06;
 pub(super) const STEER_LAG_S: f64 = 0.04;
 /// Greatest rate at which a driver's arms turn the front wheels, rad/s; a car may have slower steering.
 const STEER_RATE: f64 = 0.9;
-/// Steering that a driver who does not know the car adds for understeer where the tyres hold what they carry, rad per metre of wheelbase.
+/// Steering that a driver who does not know the car adds for understeer, rad per g and metre of wheelbase.
 const UNDERSTEER: f64 = 0.0025;
+/// Lateral acceleration (g) that such a driver takes for all of the grip; his steering goes with it.
+const GUESSED_G: f64 = 2.0;
 /// Share of the load that the driven wheels are computed to carry.
 const DRIVEN_SHARE: f64 = 0.55;
 /// Speed below which the driver computes as at this one, m/s.
@@ -118,7 +120,7 @@ impl DriverTable<f64> {
 
 /// What the driver takes the car's steady cornering for.
 pub fn cornering_of(settings: &DriverSettings, car: &Car) -> CorneringMap<f64> {
-    let guess = UNDERSTEER * (car.chassis.cg_to_front + car.chassis.cg_to_rear);
+    let guess = GUESSED_G * UNDERSTEER * (car.chassis.cg_to_front + car.chassis.cg_to_rear);
     let knowledge = settings.knowledge.clone();
     knowledge.unwrap_or_else(|| CorneringMap::guessed(guess, settings.preview_s))
 }
@@ -343,8 +345,8 @@ pub fn act<R: Lookup>(
     // present curvature asks for.
     let curvature = curvature_ahead(path, course, pose, preview * v);
     let bend = view.bend;
-    // The speed that he will have there.
-    let speed_ahead = (v + planned * preview).max(R::lit(LEAST_SPEED));
+    // The speed that one who knows the car will have there.
+    let speed_ahead = (v + knows * planned * preview).max(R::lit(LEAST_SPEED));
     let mut across_ahead = curvature * speed_ahead * speed_ahead;
     let mut across = bend * v * v;
     let mut turning = body.yaw_rate * v;
@@ -355,8 +357,9 @@ pub fn act<R: Lookup>(
         turning = turning + footing.lean;
     }
     // On a slippery road tyres slip less before they let go.
-    let [understeer, _] = speed.angles(cornering, across_ahead / grip);
-    let [_, rear_slip] = speed.angles(cornering, across / grip);
+    let held = knows * grip + (one - knows) * (friction * R::lit(GUESSED_G * GRAVITY_MPS2));
+    let [understeer, _] = speed.angles(cornering, across_ahead / held);
+    let [_, rear_slip] = speed.angles(cornering, across / held);
     let (understeer, rear_slip) = (friction * understeer, friction * rear_slip);
     let sideslip = knows * (c.cg_to_rear * bend - rear_slip);
     let heading =
