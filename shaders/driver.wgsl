@@ -136,6 +136,7 @@ fn act(
         across = across + under.lean;
         turning = turning + under.lean;
     }
+    // 19.6133 is the grip that a driver guesses who does not know the car.
     let held = driver.knows * grip + (1.0 - driver.knows) * (under.friction * 19.6133);
     let understeer = under.friction * cornering_angles(speed, across_ahead / held).x;
     let rear_slip = under.friction * cornering_angles(speed, across / held).y;

@@ -1,11 +1,10 @@
 //! What a driver knows of a car: its steady cornering, as a map over the speed and the share of the grip that is used.
 
+use super::driver::STEER_LAG_S;
+use super::plan::load_mps2;
 use crate::error::{Error, Result};
 use crate::scalar::{Lookup, Real};
 use crate::vehicle::{Car, Trim, Turn, steady_car};
-
-use super::driver::STEER_LAG_S;
-use super::plan::load_mps2;
 
 /// Rows of the map, at even steps of the speed, and the speed of the first and that between rows (m/s).
 pub const SPEEDS: usize = 8;
@@ -26,7 +25,7 @@ const FURTHEST: f64 = 1.1;
 /// A car's steady cornering over speed and share of the grip: where the wheels point and how the rear axle slips, linear between places.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CorneringMap<S> {
-    /// [`SPEEDS`] rows of [`SHARES`] and one places of [`CORNERING_WIDTH`] figures.
+    /// [`SPEEDS`] rows; each has one place more than [`SHARES`], of [`CORNERING_WIDTH`] figures.
     pub figures: Vec<S>,
 }
 
@@ -43,7 +42,7 @@ impl CorneringMap<f64> {
             let trims = steady.cornering(speed, car.max_steer_rad.max(0.3), Turn::Left);
             rows.push(row_of(car, speed, &trims));
         }
-        // A speed without states has those of the next one that has some.
+        // A speed without states has those of the speed below it, and the lowest speeds those of the first that has some.
         let Some(first) = rows.iter().position(Option::is_some) else {
             return Err(Error::Study(format!("{} has no steady state in bends", car.name)));
         };
@@ -120,7 +119,7 @@ fn row_of(car: &Car, speed: f64, trims: &[Trim]) -> Option<Vec<f64>> {
 pub(super) const PREVIEW_S: (f64, f64) = (0.05, 0.5);
 
 /// By how much steering has to be ahead of a bend (s): the lag of the arms, and that of the lateral acceleration behind the steering in
-/// slow changes. That of a single-track car (M. Mitschke, H. Wallentowitz, *Dynamik der Kraftfahrzeuge*, ch. 4) whose axles slip by these
+/// slow changes. That of a single-track car (M. Mitschke, H. Wallentowitz, *Dynamik der Kraftfahrzeuge*) whose axles slip by these
 /// angles (rad, front and rear) at this speed (m/s) and lateral acceleration (m/s^2).
 fn preview_s(car: &Car, speed: f64, ay: f64, slips: [f64; 2]) -> f64 {
     let c = &car.chassis;

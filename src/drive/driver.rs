@@ -379,7 +379,7 @@ pub fn act<R: Lookup>(
     if let Some(footing) = footing {
         force = force + c.mass * footing.climb;
     }
-    // What a bend leaves of the tyres, by the friction circle: a bend between the path's and the one that the car turns.
+    // What a bend leaves of the tyres, by the friction circle. The bend is the mean of the path's and the one that the car turns.
     let used = knows * (R::lit(0.5) * (turning + across) / grip).abs();
     let used = used.min(one);
     let left = (one - used * used).max(R::lit(0.01)).sqrt();

@@ -14,7 +14,7 @@ pub mod relief;
 mod road;
 mod settings;
 
-pub use cornering::{CORNERING_WIDTH, CorneringMap, SHARES, SPEEDS};
+pub use cornering::{CORNERING_WIDTH, CorneringMap, SHARES as CORNERING_SHARES, SPEEDS as CORNERING_SPEEDS};
 pub use path::{Pose, Row, View, frame_at, look};
 pub use plan::SpeedPlan;
 pub use record::{Drive, Lost, MotorTorque, drive, drive_planned, drive_until_lost, drive_with_motor};

@@ -12,7 +12,7 @@ use crate::optimum::within_road;
 use crate::study::framework::Progress;
 
 /// Rounds of a search that starts from a reference optimum, and iterations of its turns: it looks whether anything near the optimum
-/// is better. Longer searches, and such from coarse to fine, found nothing better by a ten thousandth on any circuit.
+/// is better. Longer searches from coarse to fine came to the same lines on the surveyed Silverstone and on a circuit of 7 km.
 const WARM_ROUNDS: usize = 1;
 const WARM_TURN: usize = 4;
 /// Rounds of the search for the minimum-curvature line that a fast line starts from.
