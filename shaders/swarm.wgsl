@@ -34,6 +34,7 @@ const REASONS: u32 = 15u;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 const CROSSING_POWER: f32 = 21.0;
+const MUTATION_POWER: f32 = 9.0;
 
 // What random draws are for, the counter's last word.
 const START: u32 = 1u;
@@ -334,7 +335,7 @@ fn cross_one(who: u32, leader: u32, slice: vec2<u32>) {
         let draws = words(RECOMBINE, who, 2u + k);
         var x = cross_coordinates(archive[leader * d + k], archive[other * d + k], draws.x, unit(draws.y));
         if unit(draws.z) * f32(d) < 1.0 {
-            x = polynomial(x, unit(draws.w), CROSSING_POWER, 1.0 / CROSSING_POWER);
+            x = polynomial(x, unit(draws.w), MUTATION_POWER, 1.0 / MUTATION_POWER);
         }
         let i = place(who, d, k);
         position[i] = x;

@@ -96,6 +96,10 @@ pub trait SteadyCar: Send + Sync {
     /// give.
     fn greatest_traction(&self, speed: f64) -> f64;
 
+    /// The slip ratio of the driven rear wheels at which they just overcome the drag, running straight at `speed` (m/s); that of the
+    /// greatest traction where they cannot.
+    fn slip_against_drag(&self, speed: f64) -> f64;
+
     /// What drives the car along its path while it corners at `ay` (m/s^2, of the sign of the turn), below the peak of `curve`,
     /// which is [`SteadyCar::cornering`] at `speed` (m/s). The road wheels turn by no more than `lock` (rad). The driven wheels share
     /// one slip ratio; the engine's power would push the car by `engine` (m/s^2) if nothing were lost. `None` where the curve does not
@@ -468,6 +472,21 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
     fn greatest_traction(&self, speed: f64) -> f64 {
         let slip = greatest(0.0, GREATEST_SLIP, |s| self.push(speed, [0.0, s]));
         self.push(speed, [0.0, slip])
+    }
+
+    fn slip_against_drag(&self, speed: f64) -> f64 {
+        let push = |slip: f64| self.push(speed, [0.0, slip]);
+        let drag = self.drag(speed);
+        let (mut low, mut high) = (0.0, greatest(0.0, GREATEST_SLIP, push));
+        while high - low > 1e-9 {
+            let middle = 0.5 * (low + high);
+            if push(middle) < drag {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
     }
 
     fn greatest_drive(

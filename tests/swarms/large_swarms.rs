@@ -87,7 +87,7 @@ fn a_large_swarm_keeps_the_knee_of_a_front_with_long_tails() {
 /// Where pulls and differences alone stay behind, a swarm that is large enough for lanes makes crossings as a small one does.
 #[test]
 fn a_large_swarm_is_as_good_as_a_small_one_where_crossings_count() {
-    for name in ["wfg1_3", "wfg4_2"] {
+    for name in ["wfg4_2", "wfg4_3"] {
         let found = |population: usize| {
             let suite = SuiteProblem::by_name(name).unwrap();
             let mut swarm = Mopso::new(suite.problem(), settings(population, 40)).unwrap();
@@ -96,8 +96,8 @@ fn a_large_swarm_is_as_good_as_a_small_one_where_crossings_count() {
             hypervolume(&front, &vec![1.1; front[0].len()]).unwrap()
         };
         let (small, large) = (found(MANY - 1), found(MANY));
-        // Without crossings it is 0.81 and 0.957 of the small one's.
-        assert!(large > 0.97 * small, "{name}: {large} after {small}");
+        // Without crossings it is 0.954 and 0.952 of the small one's.
+        assert!(large > 0.98 * small, "{name}: {large} after {small}");
     }
 }
 

@@ -21,8 +21,9 @@ pub const UNKNOWN: f32 = f32::MAX;
 /// Share of the difference that a difference move takes, and of the coordinates that it changes, as for small swarms.
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
-/// One more than the distribution index of the crossover and the mutation of a crossing.
+/// One more than the distribution indices of the crossover and the mutation of a crossing.
 const CROSSING_POWER: f32 = 21.0;
+const MUTATION_POWER: f32 = 9.0;
 /// Particles whose crossings are reckoned together.
 const SIDE_BY_SIDE: usize = 16;
 
@@ -376,7 +377,7 @@ fn cross_few(
         for (i, lane) in lanes.iter().enumerate() {
             let mut x = child[i];
             if unit_f32(words[2][i]) * (d as f32) < 1.0 {
-                x = polynomial(x, unit_f32(words[3][i]), (CROSSING_POWER, 1.0 / CROSSING_POWER));
+                x = polynomial(x, unit_f32(words[3][i]), (MUTATION_POWER, 1.0 / MUTATION_POWER));
             }
             position[k * BLOCK + lane] = x;
             velocity[k * BLOCK + lane] = 0.0;

@@ -2,8 +2,8 @@
 //!
 //! Some problems are solved by the pulls of a swarm, others by difference moves or by crossings; no fixed share of them serves
 //! all. A move earns where its candidate takes the place of members instead of standing beside them. The odds of a move are
-//! given ones, times what such a move has earned lately for each try over what the others have: probability matching, as in
-//! Thierens, *Adaptive strategies for operator allocation* (2007).
+//! given ones, times what such a move has earned lately for each try over what the others have (for crossings the square of
+//! it): probability matching, as in Thierens, *Adaptive strategies for operator allocation* (2007).
 
 use serde::{Deserialize, Serialize};
 
@@ -90,7 +90,7 @@ impl Earnings {
             return 0.0;
         }
         let others = (1.0 - usual) * self.rate(Move::Pull) + usual * WORTH * self.rate(Move::Difference);
-        let odds = CROSSINGS * self.rate(Move::Crossing) / others;
+        let odds = CROSSINGS * (self.rate(Move::Crossing) / others).powi(2);
         odds / (1.0 + odds)
     }
 
@@ -113,9 +113,12 @@ mod tests {
         let mut earnings = Earnings::default();
         let before = earnings.differences(0.25);
         assert!((before - 1.0 / 6.0).abs() < 1e-12, "{before}");
-        // A third, over what pulls and differences are worth.
+        // A third, over the square of what pulls and differences are worth.
         let crossings = earnings.crossings(0.25);
-        assert!((crossings - 1.0 / 3.7).abs() < 1e-12, "{crossings}");
+        assert!(
+            (crossings - 1.0 / (1.0 + 3.0 * 0.81)).abs() < 1e-12,
+            "{crossings}"
+        );
         for _ in 0..100 {
             earnings.count(Move::Difference, true);
             earnings.count(Move::Pull, false);
@@ -148,7 +151,7 @@ mod tests {
             assert_eq!(earnings.choice(0.0, uniform), Move::Pull);
             assert_eq!(earnings.choice(1.0, uniform), Move::Difference);
         }
-        let mixed = [0.0, 0.28, 0.9].map(|uniform| earnings.choice(0.25, uniform));
+        let mixed = [0.0, 0.35, 0.9].map(|uniform| earnings.choice(0.25, uniform));
         assert_eq!(mixed, [Move::Crossing, Move::Difference, Move::Pull]);
     }
 }

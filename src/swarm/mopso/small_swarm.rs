@@ -135,11 +135,11 @@ impl SmallSwarm {
             let drawn = |index: u32| uniform(Purpose::Recombine, 8 + 4 * k as u32 + index);
             let mut x = one[k];
             if drawn(0) < 0.5 {
-                let (low, high) = cross(one[k], other[k], drawn(1), INDEX);
+                let (low, high) = cross(one[k], other[k], drawn(1), CROSSING_INDEX);
                 x = if drawn(2) < 0.5 { low } else { high };
             }
             if uniform(Purpose::Mutation, 2 * k as u32) < share {
-                x = polynomial(x, uniform(Purpose::Mutation, 2 * k as u32 + 1), INDEX);
+                x = polynomial(x, uniform(Purpose::Mutation, 2 * k as u32 + 1), MUTATION_INDEX);
             }
             self.particles.position[i] = x;
             self.particles.velocity[i] = 0.0;
@@ -197,8 +197,10 @@ const SCALE: f64 = 0.5;
 /// Share of the coordinates that a difference move changes. A third solves ZDT4 where all of them sometimes do
 /// not, and spreads DTLZ2's front better.
 const CROSSOVER: f64 = 0.3;
-/// Distribution index of the crossover and the mutation of a crossing.
-const INDEX: f64 = 20.0;
+/// Distribution index of the crossover of a crossing.
+const CROSSING_INDEX: f64 = 20.0;
+/// Distribution index of its mutation. With the usual 20, UF5 ends at a hypervolume of 0.09 instead of 0.31.
+const MUTATION_INDEX: f64 = 8.0;
 
 impl Optimiser for SmallSwarm {
     fn ask(&mut self) -> Vec<f64> {
@@ -222,12 +224,11 @@ impl Optimiser for SmallSwarm {
             let range = self.particles.row(particle);
             let position = &self.particles.position[range.clone()];
             let violation = evaluation.violation(of);
-            let (members, level) = (self.archive.len(), self.archive.violation());
+            let mut members = self.archive.objectives.iter();
+            let takes = violation < self.archive.violation() || members.any(|member| dominates(row, member));
             let entered = self.archive.insert_violating(position, row, violation);
             if !scattered {
-                // It takes no more room than what it dominates, and leaves some.
-                let room = self.archive.len() <= members && self.archive.len() < self.settings.archive;
-                let earned = entered && (room || self.archive.violation() < level);
+                let earned = takes && entered;
                 let made = self.choice(&before, particle);
                 self.earnings.count(made, earned);
             }
