@@ -3,8 +3,8 @@
     python3 benches/random_circuits.py 7 14 circuits
     python3 benches/circuits.py target/release/lapswarm circuits/*.csv
 
-Seed, number, folder. A circuit is a closed curve whose distance from the middle is a Fourier series, stretched one way. Its tightest bend is
-no tighter than 13 m, it has a point every 2, 4, 5 or 8 m, and half of the surveys are off by 3 cm (standard deviation). Needs numpy.
+A circuit is a closed curve whose distance from the middle is a Fourier series, stretched one way. Its tightest bend has a radius of 13 m or
+more. It has a point every 2, 4, 5 or 8 m, and half of the surveys are off by 3 cm (standard deviation). Needs numpy.
 """
 
 import argparse
@@ -55,9 +55,9 @@ def survey(random, x, y):
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("seed", type=int)
-    arguments.add_argument("number", type=int)
-    arguments.add_argument("folder", type=pathlib.Path)
+    arguments.add_argument("seed", type=int, help="seed of all random numbers")
+    arguments.add_argument("number", type=int, help="how many circuits")
+    arguments.add_argument("folder", type=pathlib.Path, help="where r0.csv, r1.csv ... are written")
     given = arguments.parse_args()
     given.folder.mkdir(exist_ok=True)
     random = np.random.default_rng(given.seed)

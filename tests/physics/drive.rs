@@ -9,6 +9,7 @@ use lapswarm::drive::{
 };
 use lapswarm::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings};
 use lapswarm::track::{Circuit, CurvatureTable, FrictionAcross, Relief, ReliefChange, Track};
+use lapswarm::vehicle::limits::SpeedRange;
 use lapswarm::vehicle::model::runge_kutta_step_on;
 use lapswarm::vehicle::wheels::moments_under;
 use lapswarm::vehicle::{Car, CarFacts, CarInput, CarModel, CarState};
@@ -445,6 +446,27 @@ fn a_driver_knows_a_car_with_much_downforce_at_every_speed() {
     map.figures = at_70.repeat(map.figures.len() / row);
     let strays_m = off_m(&of_one_speed, slow);
     assert!(strays_m > 0.2, "{strays_m} m");
+}
+
+/// In a wide bend the car drives at the top of its envelope. The drag of its tyres there, some 180 N over a slip stiffness of 410 kN,
+/// takes 0.03 m/s. At the speed at which the rims would turn with no slip it cannot drive: its engine ends there.
+#[test]
+fn the_car_reaches_the_top_of_its_envelope() {
+    let car = bundled_car();
+    let settings = DriverSettings::racing(&car).expect("steady states");
+    let speeds = SpeedRange::USUAL.speeds_of(&car).expect("speeds");
+    let top_mps = *speeds.last().expect("a top speed");
+    let short_mps = |planned_mps: f64| {
+        let circuit = banked(600.0, 0.0);
+        let plan = SpeedPlan::of_speeds(&[0.0], &[planned_mps], circuit.length_m);
+        let driven = drive_planned(&car, &circuit, plan, &settings, 0.05).expect("it gets round");
+        planned_mps - driven.states.last().expect("a sample")[0]
+    };
+    let short = short_mps(top_mps);
+    assert!(short.abs() < 0.05, "{short} m/s below {top_mps} m/s");
+    let rims_mps = 70.0;
+    let short = short_mps(rims_mps);
+    assert!(short > 0.4, "{short} m/s below {rims_mps} m/s");
 }
 
 /// Braking at 12 m/s^2 from 60 to 30 m/s on the arc of a large circle: half-way the driver is at the planned speed. One who aims for

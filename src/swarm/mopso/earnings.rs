@@ -14,7 +14,8 @@ const FADE: f64 = 0.95;
 const BOUNDS: [f64; 2] = [0.1, 0.4];
 /// What a difference move's earnings are worth beside a pull's: it often earns by what pulls have found.
 const WORTH: f64 = 0.6;
-/// The odds of a crossing where all moves earn alike. As many crossings as others lose on problems with linked variables.
+/// The odds of a crossing that earns as much as pulls and differences are worth. As many crossings as others lose on problems with linked
+/// variables.
 const CROSSINGS: f64 = 1.0 / 3.0;
 /// What every kind is held to have earned and tried before it has.
 const BEFORE: [f64; 2] = [0.1, 1.0];
