@@ -41,7 +41,7 @@
 //!     f[0] = x.iter().map(|x| x * x).sum();
 //!     f[1] = x.iter().map(|x| (x - 1.0) * (x - 1.0)).sum();
 //! });
-//! let settings = MopsoSettings { archive: 20, ..MopsoSettings::default() }.with_size(40, 60);
+//! let settings = MopsoSettings { archive: 20, ..MopsoSettings::default() }.with_size(40, 500);
 //! let mut swarm = Mopso::new(&problem, settings)?;
 //! while !swarm.done() {
 //!     let candidates = swarm.ask();
