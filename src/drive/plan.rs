@@ -2,6 +2,7 @@
 //! section 5, in first-order form; a driver needs no better).
 
 use super::relief::{RELIEF_WIDTH, row_of};
+use crate::scalar::bisected;
 use crate::track::Circuit;
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::{Car, Chassis, Tyres};
@@ -83,19 +84,10 @@ impl TyreEnvelope<'_> {
             return v;
         }
         let holds = |v: f64| (curvature * v * v + row[1]).abs() <= self.grip(v, row);
-        let (mut low, mut high) = (0.0, top);
         if holds(top) {
             return top;
         }
-        for _ in 0..50 {
-            let middle = 0.5 * (low + high);
-            if holds(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
+        bisected([0.0, top], 1e-12 * top, holds)[0]
     }
 }
 

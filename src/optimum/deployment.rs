@@ -14,6 +14,7 @@ use crate::line::energy::kernel::motors_step;
 use crate::line::energy::{EnergyCar, EnergyLap, EnergyPlan, Gates, Mode};
 use crate::line::ground::{Grounds, LevelRoad, SlopedRoad};
 use crate::line::kernel::{Course, may_open};
+use crate::scalar::bisected;
 use crate::track::Surface;
 use glam::DVec2;
 use rayon::prelude::*;
@@ -71,8 +72,6 @@ const DERIVATIVE: f64 = 1e-4;
 const LEAST_SQUARE: f64 = 1.0;
 /// Motor's part of the acceleration (m/s^2) below which a segment has no use for it.
 const LEAST_MOTOR: f64 = 1e-9;
-/// Halvings of the share that gives a wanted part: to the last bit of a double.
-const HALVINGS: usize = 52;
 /// A move below which a small gain settles nothing.
 const SMALL_MOVE: f64 = 0.05;
 /// Energy of a lap that may deploy as much as it wants to (J).
@@ -318,16 +317,7 @@ impl DeploymentSearch<'_> {
         if added(1.0) <= motor {
             return 1.0;
         }
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if added(middle) < motor {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        high
+        bisected([0.0, 1.0], f64::EPSILON, |share| added(share) < motor)[1]
     }
 }
 

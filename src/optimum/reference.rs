@@ -136,6 +136,9 @@ const NEARBY: f64 = 0.02;
 /// Share of a lap below which no cone program is worth its time. Programs that promise less gain a fraction of it: the envelope's
 /// kinks between its rows are beyond their models.
 const LEAST_GAIN_ABOUT: f64 = 4e-5;
+/// Share of a lap that the last stage's programs may promise still. A line that they promise more is taken about itself once more,
+/// before it is brought onto the road.
+const LEFT_TO_GAIN: f64 = 5e-4;
 /// What a change of lateral acceleration of 1 g within 10 m counts (s). The fastest lines of ten made circuits lose a thousandth of a
 /// percent by it.
 const ROUGHNESS_S: f64 = 5e-4;
@@ -353,32 +356,39 @@ impl ReferenceSolvers {
         stages
     }
 
-    /// The fastest line near one, stage by stage; only what the last of them finds has to be on the road.
+    /// The fastest line near one, stage by stage, the last once more where it [left more to gain](LEFT_TO_GAIN). Only what that finds
+    /// has to be on the road.
     fn about_itself(&self, alpha: &[f64], stages: &[About]) -> Result<Option<Optimum>> {
         if self.envelope.is_none() {
             return Ok(None);
         }
         let mut found: Option<Optimum> = None;
-        for (turn, how) in stages.iter().enumerate() {
+        let last = stages.len() - 1;
+        let open = stages[..last].iter().map(|how| (how, -1.0));
+        let kept = [LEFT_TO_GAIN, f64::INFINITY].map(|most_left| (&stages[last], most_left));
+        for (how, most_left) in open.chain(kept) {
             if self.stop.load(Ordering::Relaxed) {
                 break;
             }
-            let kept = turn + 1 == stages.len();
             let alpha = found.as_ref().map_or(alpha, |f| &f.x);
-            if let Some(closer) = self.taken_about(alpha, how, kept)? {
+            let (closer, kept) = self.taken_about(alpha, how, most_left)?;
+            if let Some(closer) = closer {
                 let before_s = found.as_ref().map_or(0.0, |f| f.seconds);
                 found = Some(Optimum {
                     seconds: before_s + closer.seconds,
                     ..closer
                 });
             }
+            if kept {
+                break;
+            }
         }
         Ok(found)
     }
 
-    /// The fastest line about one, if it is faster. If it is to be kept on the road, a line on the road is
-    /// better than any other.
-    fn taken_about(&self, alpha: &[f64], how: &About, kept: bool) -> Result<Option<Optimum>> {
+    /// The fastest line about one, if it is faster, and whether it was to be kept on the road: where the programs promise at most
+    /// `most_left` more, as a share of the lap. A line on the road is then better than any other.
+    fn taken_about(&self, alpha: &[f64], how: &About, most_left: f64) -> Result<(Option<Optimum>, bool)> {
         let own = self.cross_sections.points(alpha);
         // A closed spline through as many points of the line as there are controls has no ripples that these could not take off. A
         // line that touches jagged edges has, and a lap on the fine spline suffers from every one.
@@ -387,7 +397,7 @@ impl ReferenceSolvers {
         let about =
             few.and_then(|few| cross_sections_about(road, &few.points(&few.reference), how.spread(1)));
         let Ok(about) = about else {
-            return Ok(None);
+            return Ok((None, false));
         };
         let controls = (about.len() / how.cross_sections_per_control).max(4);
         let (map, mut bounds) = LineMap::spline_about(&about, &about.reference, controls);
@@ -409,8 +419,9 @@ impl ReferenceSolvers {
             ..settings
         };
         let Ok(mut solved) = fastest(&problem, &bounds, &start, &settings) else {
-            return Ok(None);
+            return Ok((None, false));
         };
+        let kept = solved.left() <= most_left;
         let before = self.driven(alpha)?;
         let mut best: Option<(Vec<f64>, Driven)> = None;
         let rounds = if kept { TIGHTENINGS } else { 0 };
@@ -441,7 +452,7 @@ impl ReferenceSolvers {
             };
         }
         let better = best.filter(|(_, driven)| driven.rank(kept) < before.rank(kept));
-        Ok(better.map(|(x, _)| Optimum { x, ..solved }))
+        Ok((better.map(|(x, _)| Optimum { x, ..solved }), kept))
     }
 
     /// A line through the cross-sections, as it is driven.

@@ -4,6 +4,7 @@
 //! reference), in `f32` and `f32` lanes (the SIMD backend, twin of the WGSL kernels) and in dual numbers
 //! (exact derivatives).
 
+mod bisection;
 mod counted;
 mod dual;
 pub mod elementary;
@@ -13,6 +14,7 @@ mod lockstep;
 mod lookup;
 mod pair;
 
+pub use bisection::{bisected, try_bisected};
 pub use counted::{Counted, operations_of};
 pub use dual::Dual;
 pub use lookup::Lookup;

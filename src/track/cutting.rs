@@ -11,6 +11,7 @@ use super::cross_sections::CrossSections;
 use super::crossing::{Stretch, crossings, stretches};
 use super::relief::SectionRelief;
 use super::road::{Road, RoadFrame, even_stations, spread};
+use crate::scalar::bisected;
 use crate::{Error, Place, Result};
 use glam::DVec2;
 
@@ -286,14 +287,7 @@ impl<'a> Cutter<'a> {
                     return None;
                 }
             }
-            for _ in 0..40 {
-                let middle = 0.5 * (low + high);
-                if short(middle) > 0.0 {
-                    low = middle
-                } else {
-                    high = middle
-                }
-            }
+            let [low, _] = bisected([low, high], 1e-12 * step, |along| short(along) > 0.0);
             Some(frame.position_m + way * low * left)
         };
         Some([reach(-1.0, frame.right_m)?, reach(1.0, frame.left_m)?])

@@ -21,10 +21,8 @@ use crate::{Error, Place, Result};
 
 /// Distance between samples of a circuit (m), before rounding to a whole number of steps.
 const SPACING_M: f64 = 1.0;
-/// Greatest gap of a closed lap (m) for laps up to this length (m). On longer laps, rounding grows with their size and number of
-/// steps.
+/// Greatest gap of a closed lap (m), where rounding allows it.
 const CLOSED_TO_M: f64 = 1e-10;
-const CLOSED_TO_UP_TO_M: f64 = 10_000.0;
 /// A gap beyond this share of the length is a mistake in the table, not a measuring error.
 const LARGEST_GAP: f64 = 0.03;
 /// A total turn further than this from a whole number of turns is a mistake in the table (rad).
@@ -324,7 +322,9 @@ impl CurvatureTable {
         let centre = lap.iter().sum::<DVec2>() / n;
         let size = (lap.iter().map(|p| p.distance_squared(centre)).sum::<f64>() / n).sqrt();
         let kernels: Vec<DVec3> = lap.iter().map(|&p| ((p - centre) / size).extend(1.0)).collect();
-        let closed_to = CLOSED_TO_M * (self.length_m / CLOSED_TO_UP_TO_M).max(1.0).powi(2);
+        // Each step rounds the heading by up to half of EPSILON of a turn. On a circle every step does so the same way, and the end
+        // misses the start by n EPSILON / 2 times the length; positions round less.
+        let closed_to = CLOSED_TO_M.max(f64::EPSILON * n * self.length_m);
         let table = curvature.to_vec();
         let mut line = run(curvature);
         let mut change = DVec3::ZERO;

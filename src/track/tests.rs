@@ -68,6 +68,23 @@ fn circles_have_their_radius_either_way_round() {
     }
 }
 
+/// Every step round a circle rounds the same way, so that the end misses the start by more the longer the lap is.
+#[test]
+fn long_circles_close() {
+    for radius_m in [700.0, 1500.0, 4000.0, 30_000.0] {
+        let (c, _) = CurvatureTable::circle(radius_m, 12.0, true).build().unwrap();
+        let centre = DVec2::new(0.0, radius_m);
+        let across_m = c.position_at(0.5 * c.length_m).distance(c.position_at(0.0));
+        assert!(
+            (across_m / radius_m - 2.0).abs() < 1e-9,
+            "{radius_m} m: {across_m}"
+        );
+        let away = |p: &DVec2| (p.distance(centre) / radius_m - 1.0).abs();
+        let farthest = c.centreline_m.iter().map(away).fold(0.0, f64::max);
+        assert!(farthest < 1e-9, "{radius_m} m: {farthest}");
+    }
+}
+
 #[test]
 fn an_open_road_ends_where_it_should() {
     let mut table = CurvatureTable::circle(100.0, 10.0, true);

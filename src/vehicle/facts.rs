@@ -15,6 +15,7 @@ use crate::config::kinds::{count, number, optional, text};
 use crate::config::settings::{Settings, settings};
 use crate::config::{Document, read_text};
 use crate::error::{Error, Result};
+use crate::scalar::bisected;
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -321,16 +322,7 @@ pub fn top_speed_kmh(car: &Car) -> Option<f64> {
         force > 0.0 && force >= car.chassis.mass * steady.drag(v)
     };
     // From above: at very low speed an engine gives no force in any gear.
-    let (mut low, mut high) = (1.0, 200.0);
-    while high - low > 1e-3 {
-        let middle = 0.5 * (low + high);
-        if drives(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    Some(low * 3.6)
+    Some(3.6 * bisected([1.0, 200.0], 1e-3, drives)[0])
 }
 
 /// Scales friction along and across.

@@ -9,6 +9,7 @@ use super::envelope::{BendTraction, root_left};
 use super::powertrain::GRAVITY_MPS2;
 use super::{BendDrive, Car, Envelope, EnvelopeRow, SteadyCar, Traction, Trim, Turn, steady_car};
 use crate::error::{Error, Result};
+use crate::scalar::bisected;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -57,17 +58,9 @@ impl SpeedRange {
             && speeds.len() < count
         {
             // The engine ends between two speeds: that is the car's greatest.
-            let (mut low, mut high) = (last, last + self.step_mps);
-            while high - low > 1e-6 {
-                let middle = 0.5 * (low + high);
-                if drives(middle) {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            if low - last > 1e-3 {
-                speeds.push(low);
+            let [top, _] = bisected([last, last + self.step_mps], 1e-6, drives);
+            if top - last > 1e-3 {
+                speeds.push(top);
             }
         }
         Ok(speeds)

@@ -13,7 +13,7 @@ use super::loads::wheel_loads;
 use super::model::{CarInput, CarModel, CarState};
 use super::tyre::Tyre;
 use super::{Car, LinearTyre, MagicFormula, TyreModel};
-use crate::scalar::{Dual, Real};
+use crate::scalar::{Dual, Real, bisected};
 use nalgebra::{SMatrix, SVector};
 
 /// Unknowns of a trim.
@@ -477,16 +477,8 @@ impl<T: Tyre<f64>, D: Tyre<Exact>> SteadyCar for Ready<T, D> {
     fn slip_against_drag(&self, speed: f64) -> f64 {
         let push = |slip: f64| self.push(speed, [0.0, slip]);
         let drag = self.drag(speed);
-        let (mut low, mut high) = (0.0, greatest(0.0, GREATEST_SLIP, push));
-        while high - low > 1e-9 {
-            let middle = 0.5 * (low + high);
-            if push(middle) < drag {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        high
+        let range = [0.0, greatest(0.0, GREATEST_SLIP, push)];
+        bisected(range, 1e-9, |slip| push(slip) < drag)[1]
     }
 
     fn greatest_drive(

@@ -8,6 +8,7 @@ use super::strategy::MOST_MJ;
 use crate::error::{Error, Result};
 use crate::evaluate::energy::{Free, HybridObjective, HybridProblem, open_hybrid_evaluator};
 use crate::line::energy::{Gates, Mode};
+use crate::scalar::try_bisected;
 use crate::study::framework::journal::Recorder;
 use crate::swarm::{
     CovarianceSettings, CovarianceSwarm, HybridSettings, HybridSwarm, Optimiser, Progress, run,
@@ -58,22 +59,16 @@ pub fn engine_only(setup: &HybridSetup, lap_time_s: f64) -> Result<Option<(f64, 
         };
         drive_engine_alone(&other)
     };
-    let [mut low, mut high] = ENGINES;
-    if lap_with(low)?.lap.time < lap_time_s || lap_with(high)?.lap.time > lap_time_s {
+    let [least, most] = ENGINES;
+    if lap_with(least)?.lap.time < lap_time_s || lap_with(most)?.lap.time > lap_time_s {
         return Ok(None);
     }
     // To a thousandth of a horsepower.
-    while high - low > 1e-6 {
-        let middle = 0.5 * (low + high);
-        if lap_with(middle)?.lap.time > lap_time_s {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let slower = |share: f64| Ok(lap_with(share)?.lap.time > lap_time_s);
+    let [_, share] = try_bisected(ENGINES, 1e-6, slower)?;
     Ok(Some((
-        high,
-        lap_with(high)?.lap.fuel / setup.car.fuel_density_kgpl,
+        share,
+        lap_with(share)?.lap.fuel / setup.car.fuel_density_kgpl,
     )))
 }
 

@@ -11,13 +11,12 @@ use crate::error::Result;
 use crate::evaluate::Evaluation;
 use crate::evaluate::energy::HybridProblem;
 use crate::line::energy::{EnergyPlan, Gates};
+use crate::scalar::bisected;
 use crate::swarm::{Counters, Front, Optimiser};
 
 /// What the shares of zones are made to spend on a lap with the motor on wherever it is of use, for each joule that there is, at a greatest
 /// weight of zero and of one. A lap that uses the motor less is slower, and spends more on every metre.
 const AIM: [f64; 2] = [0.92, 1.08];
-/// Halvings in which the factor is found.
-const HALVINGS: usize = 40;
 
 /// What zones spend, by the share of each.
 #[derive(Clone, Debug)]
@@ -91,18 +90,11 @@ impl Spending {
                 .sum()
         };
         let least = weights.iter().copied().filter(|w| *w > 0.0).fold(1.0, f64::min);
-        let (mut low, mut high) = (0.0, least.recip());
-        if spent_j(high) > wanted_j {
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if spent_j(middle) < wanted_j {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
+        let mut factor = least.recip();
+        if spent_j(factor) > wanted_j {
+            [_, factor] = bisected([0.0, factor], 1e-12 * factor, |f| spent_j(f) < wanted_j);
         }
-        let shares = weights.iter().map(|weight| share(weight, high));
+        let shares = weights.iter().map(|weight| share(weight, factor));
         own.iter().copied().chain(shares).collect()
     }
 }

@@ -14,6 +14,7 @@ use crate::line::energy::{EnergyPlan, Gates, Mode, late_bend, zone_starts};
 use crate::line::{Parametrisation, geometry};
 use crate::optimum::{Deployment, DeploymentSearch};
 use crate::random::Random;
+use crate::scalar::try_bisected;
 use crate::study::framework::journal::Recorder;
 use crate::swarm::{
     FrontSearch, HybridSettings, HybridSwarm, MopsoSettings, Optimiser, Progress, Pso, Reached, SwarmPlace,
@@ -351,21 +352,13 @@ pub const MOST_MJ: f64 = 30.0;
 /// # Errors
 /// Those of `excess`.
 pub fn budget_at(mut excess: impl FnMut(f64) -> Result<f64>) -> Result<f64> {
-    let (mut low, mut high) = (0.0, MOST_MJ);
-    if excess(low)? <= 0.0 {
-        return Ok(low);
+    if excess(0.0)? <= 0.0 {
+        return Ok(0.0);
     }
-    if excess(high)? > 0.0 {
-        return Ok(high);
+    if excess(MOST_MJ)? > 0.0 {
+        return Ok(MOST_MJ);
     }
     // To a tenth of a joule.
-    while high - low > 1e-7 {
-        let middle = 0.5 * (low + high);
-        if excess(middle)? > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    Ok(high)
+    let [_, enough] = try_bisected([0.0, MOST_MJ], 1e-7, |budget| Ok(excess(budget)? > 0.0))?;
+    Ok(enough)
 }

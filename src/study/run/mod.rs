@@ -324,9 +324,9 @@ fn run_stages(
         driven_within = Some(at.join("envelope_driven.csv"));
         last_line = Some(line_path);
         let found = RoundSummary::of(&found, &lap)?;
-        let settled = rounds
-            .last()
-            .is_some_and(|before| (before.grip_share - found.grip_share).abs() <= SETTLED);
+        // The first line is driven within the whole envelope.
+        let before = rounds.last().map_or(1.0, |before| before.grip_share);
+        let settled = (before - found.grip_share).abs() <= SETTLED;
         rounds.push(found);
         if settled {
             break;

@@ -287,6 +287,8 @@ pub fn lines_table(summary: &Summary) -> Table<'static> {
     let mut rows: Vec<(String, &LineFigures, Option<f64>)> = Vec::new();
     for (name, figures) in &summary.best {
         let gap = summary.above_exact_percent.get(name).copied().flatten();
+        // What is less than a hundred-thousandth of a percent is rounding.
+        let gap = gap.map(|percent| (1e5 * percent).round() / 1e5 + 0.0);
         rows.push((format!("best {name}"), figures, gap));
     }
     for (name, figures) in &summary.exact {
