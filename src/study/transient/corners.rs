@@ -18,8 +18,11 @@ use std::ops::ControlFlow;
 
 /// A corner ends at a greatest speed from which the car slows down by at least this much (m/s), and has gained as much.
 const LEAST_DROP_MPS: f64 = 3.0;
+/// It ends where the lap turns over from one side to the other, too, between lateral accelerations of this share of the lap's
+/// greatest: fast esses are driven at nearly one speed.
+const LEAST_BEND: f64 = 0.5;
 
-/// A corner of a driven lap, from one greatest speed to the next.
+/// A corner of a driven lap, from one greatest speed to the next, or to where the lap turns over to the other side.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CornerGrip {
     /// Station of its start along the line (m).
@@ -36,33 +39,50 @@ pub struct CornerGrip {
     pub full_grip_s: f64,
 }
 
-/// The corner that each section of a closed lap belongs to, and how many there are; `v_mps` are its speeds.
-fn corners_of(v_mps: &[f64]) -> (Vec<usize>, usize) {
+/// The corner that each section of a closed lap belongs to, and how many there are, by its speeds (m/s) and lateral accelerations
+/// (m/s^2). Numbers begin at the greatest speed.
+fn corners_of(v_mps: &[f64], ay_mps2: &[f64]) -> (Vec<usize>, usize) {
     let n = v_mps.len();
     let start = (0..n).max_by(|i, j| v_mps[*i].total_cmp(&v_mps[*j])).unwrap_or(0);
+    let at = |step: usize| (start + step) % n;
+    let bend_mps2 = LEAST_BEND * ay_mps2.iter().map(|ay| ay.abs()).fold(0.0, f64::max);
     let mut corner_of = vec![0; n];
     let (mut corner, mut rising) = (0, false);
-    let (mut least, mut most) = (v_mps[start], start);
+    let (mut least, mut most) = (v_mps[start], 0);
+    // The last bend, with the side that it turned to, and where the lap turned over last.
+    let (mut bend, mut turned_over): (Option<(usize, f64)>, usize) = (None, 0);
     for step in 0..n {
-        let here = (start + step) % n;
-        let v = v_mps[here];
+        let (v, ay) = (v_mps[at(step)], ay_mps2[at(step)]);
+        let mut begins = None;
+        if step > 0 && ay * ay_mps2[at(step - 1)] <= 0.0 {
+            turned_over = step;
+        }
         if rising {
-            if v > v_mps[most] {
-                most = here;
+            if v > v_mps[at(most)] {
+                most = step;
             }
-            if v < v_mps[most] - LEAST_DROP_MPS {
-                corner += 1;
-                let after = (0..).map(|k| (most + k) % n).take_while(|i| *i != here);
-                after.for_each(|i| corner_of[i] = corner);
-                (rising, least) = (false, v);
+            if v < v_mps[at(most)] - LEAST_DROP_MPS {
+                begins = Some(most + 1);
+                bend = bend.filter(|(last, _)| *last > most);
             }
         } else {
             least = least.min(v);
             if v > least + LEAST_DROP_MPS {
-                (rising, most) = (true, here);
+                (rising, most) = (true, step);
             }
         }
-        corner_of[here] = corner;
+        if ay.abs() >= bend_mps2 && ay != 0.0 {
+            if begins.is_none() && bend.is_some_and(|(_, side)| side * ay < 0.0) {
+                begins = Some(turned_over);
+            }
+            bend = Some((step, ay.signum()));
+        }
+        if let Some(begins) = begins {
+            corner += 1;
+            (begins..step).for_each(|step| corner_of[at(step)] = corner);
+            (rising, least) = (false, v);
+        }
+        corner_of[at(step)] = corner;
     }
     (corner_of, corner + 1)
 }
@@ -101,7 +121,7 @@ impl<'a> Corners<'a> {
         let tables = shares.iter().map(table).collect::<Result<_>>()?;
         let fine = FineLine::on(&line.points_m, line.relief.as_deref(), true, 1.0, None, 0.0)?;
         let (corner_of, count) = match &base.point_mass.lap {
-            Some(lap) => corners_of(&lap.v_mps),
+            Some(lap) => corners_of(&lap.v_mps, &lap.ay_mps2),
             None => (vec![0; fine.points_m.len()], 1),
         };
         Ok(Self {
@@ -185,7 +205,9 @@ pub(super) fn raise(
     let traction = Traction::of(car, &limits.envelope);
     let corners = Corners::new(line, limits, &traction, &base, shares)?;
     let top = corners.shares.len() - 1;
-    let mut found = state.corners.take().unwrap_or_else(|| CornerState {
+    let saved = state.corners.take();
+    let saved = saved.filter(|saved| saved.levels.len() == corners.count);
+    let mut found = saved.unwrap_or_else(|| CornerState {
         levels: vec![0; corners.count],
         frozen: vec![false; corners.count],
         best: vec![0; corners.count],
@@ -323,13 +345,29 @@ mod tests {
         }
         // From the end back to the start, braking.
         v.extend((0..10).map(|i| 60.0 - 3.0 * f64::from(i)));
-        let (corner_of, count) = corners_of(&v);
+        let straight = vec![0.0; v.len()];
+        let (corner_of, count) = corners_of(&v, &straight);
         assert_eq!(count, 3);
         assert_eq!((corner_of[70], corner_of[0], corner_of[9]), (0, 0, 0));
         assert_eq!(
             (corner_of[10], corner_of[29], corner_of[30], corner_of[69]),
             (1, 1, 2, 2)
         );
+    }
+
+    /// At one speed: right, left, a kink to the right that is no bend, left again, and right. The straight between belongs to the
+    /// bend before it.
+    #[test]
+    fn corners_end_where_the_lap_turns_over() {
+        let bends = [-9.0, 10.0, -2.0, 8.0, 0.0, -6.0];
+        let ay: Vec<f64> = bends.iter().flat_map(|ay| [*ay; 10]).collect();
+        let (corner_of, count) = corners_of(&[50.0; 60], &ay);
+        assert_eq!(count, 3);
+        // The greatest of equal speeds is the last.
+        let first = [corner_of[59], corner_of[0], corner_of[9]];
+        assert_eq!(first, [0; 3]);
+        assert_eq!((corner_of[10], corner_of[39]), (1, 1));
+        assert_eq!((corner_of[50], corner_of[58]), (2, 2));
     }
 
     #[test]

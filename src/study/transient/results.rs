@@ -371,7 +371,7 @@ fn write_page(
     );
     place_laps(&mut page, folder, titles, &outcome.line, laps)?;
     if !summary.corners.is_empty() {
-        let note = "Each from one greatest speed to the next. Lost is the time to the quasi-steady-state lap with all of the grip.";
+        let note = "Each from one greatest speed to the next, or to where the lap turns over to the other side. Lost is the time to the quasi-steady-state lap with all of the grip.";
         page.table("Grip by corner", note, &corners(summary))?;
     }
     if let (Some(figures), Some(driven), Some(ideal)) = (&summary.energy, accounts, &outcome.ideal) {
