@@ -1,7 +1,7 @@
-//! Where a condition ends to hold along a range.
+//! Bisection.
 
-/// Where `holds`, which is so below a place and not above it, changes: the ends of a part of the range no wider than `within` that
-/// encloses the place, or of two neighbouring numbers where these are farther apart.
+/// The place in a range up to which `holds` is true and beyond which it is false, enclosed between two numbers: no more than `within`
+/// apart, or neighbours where numbers lie farther apart than that.
 pub fn bisected(range: [f64; 2], within: f64, mut holds: impl FnMut(f64) -> bool) -> [f64; 2] {
     let sure = |at: f64| Ok::<_, std::convert::Infallible>(holds(at));
     match try_bisected(range, within, sure) {
@@ -9,7 +9,7 @@ pub fn bisected(range: [f64; 2], within: f64, mut holds: impl FnMut(f64) -> bool
     }
 }
 
-/// As [`bisected`], for a condition that may fail to be told.
+/// As [`bisected`], where finding out may fail.
 ///
 /// # Errors
 /// Those of `holds`.

@@ -18,7 +18,7 @@ use std::ops::ControlFlow;
 
 /// A corner ends at a greatest speed from which the car slows down by at least this much (m/s), and has gained as much.
 const LEAST_DROP_MPS: f64 = 3.0;
-/// It ends where the lap turns over from one side to the other, too, between lateral accelerations of this share of the lap's
+/// A corner also ends where the lap turns over from one side to the other, between lateral accelerations of this share of the lap's
 /// greatest: fast esses are driven at nearly one speed.
 const LEAST_BEND: f64 = 0.5;
 
@@ -205,6 +205,7 @@ pub(super) fn raise(
     let traction = Traction::of(car, &limits.envelope);
     let corners = Corners::new(line, limits, &traction, &base, shares)?;
     let top = corners.shares.len() - 1;
+    // Another build may have had other corners.
     let saved = state.corners.take();
     let saved = saved.filter(|saved| saved.levels.len() == corners.count);
     let mut found = saved.unwrap_or_else(|| CornerState {
