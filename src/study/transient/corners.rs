@@ -350,10 +350,9 @@ mod tests {
         let (corner_of, count) = corners_of(&v, &straight);
         assert_eq!(count, 3);
         assert_eq!((corner_of[70], corner_of[0], corner_of[9]), (0, 0, 0));
-        assert_eq!(
-            (corner_of[10], corner_of[29], corner_of[30], corner_of[69]),
-            (1, 1, 2, 2)
-        );
+        // A greatest speed is the end of the corner before it.
+        assert_eq!((corner_of[10], corner_of[11]), (0, 1));
+        assert_eq!((corner_of[30], corner_of[31], corner_of[69]), (1, 2, 2));
     }
 
     /// At one speed: right, left, a kink to the right that is no bend, left again, and right. The straight between belongs to the
