@@ -136,7 +136,7 @@ const NEARBY: f64 = 0.02;
 /// Share of a lap below which no cone program is worth its time. Programs that promise less gain a fraction of it: the envelope's
 /// kinks between its rows are beyond their models.
 const LEAST_GAIN_ABOUT: f64 = 4e-5;
-/// Share of a lap that the last stage's programs may promise still. A line that they promise more is taken about itself once more,
+/// Share of a lap that the last stage's programs may still promise. Where they promise more, the line is taken about itself once more
 /// before it is brought onto the road.
 const LEFT_TO_GAIN: f64 = 5e-4;
 /// What a change of lateral acceleration of 1 g within 10 m counts (s). The fastest lines of ten made circuits lose a thousandth of a

@@ -70,8 +70,8 @@ fn a_figure_of_eight_has_a_fastest_line() {
     assert!(line.clearance.margin_m >= -ON_ROAD_M, "{:?}", line.clearance);
 }
 
-/// Chicanes turn a line over so quickly that the last stage's two programs still promise a quarter of a percent: its line was 0.12 %
-/// above that of four more. Eight more programs about the line now gain less than the 0.05 % that lines may be above the optimum.
+/// On the chicanes the last stage's two programs still promise a quarter of a percent, and the line that they left was 0.12 % above
+/// today's. Eight more programs about today's line gain less than the 0.05 % that lines may be above the optimum.
 #[test]
 fn the_fastest_line_through_chicanes_is_settled() {
     let folder = tempfile::tempdir().expect("a folder");
