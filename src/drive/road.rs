@@ -9,8 +9,12 @@ use crate::track::Circuit;
 use crate::vehicle::model::GREATEST_SPEED;
 use std::f64::consts::{PI, TAU};
 
-/// How long before the start line the flying lap begins, m.
+/// How long before the start line the flying lap begins at the least, m.
 const RUN_UP_M: f64 = 500.0;
+/// The car does not turn yet where the run-up begins. So the plan may ask for no more than this lateral acceleration (m/s^2) there,
+const CALM_MPS2: f64 = 3.0;
+/// over this length, m.
+const CALM_M: f64 = 30.0;
 /// Least mean speed of a lap, m/s. Slower laps are not waited for.
 const SLOWEST_MPS: f64 = 5.0;
 /// Cells of a plan before its first cell, for the stretch just before the start line.
@@ -45,6 +49,38 @@ pub struct Road<S> {
     pub rows_ahead: usize,
     /// The most cells that a driver looks ahead.
     pub cells_ahead: usize,
+}
+
+/// Where the run-up to a line begins (m): the last calm place that is far enough before the start line, or the calmest of all.
+fn run_up_m(line: &Line<'_>) -> f64 {
+    let circuit = line.circuit;
+    let (count, spacing) = (circuit.station_m.len(), circuit.spacing_m());
+    let latest_m = circuit.length_m - RUN_UP_M.min(0.4 * circuit.length_m);
+    let latest = ((latest_m / spacing) as usize).min(count - 1);
+    let across_mps2 = |row: usize| {
+        let speed = |plan: &SpeedPlan| {
+            let cell = (row as f64 * spacing / plan.spacing_m) as usize;
+            plan.speed_mps[cell.min(plan.speed_mps.len() - 1)]
+        };
+        let fastest = line.plans.iter().map(speed).fold(0.0, f64::max);
+        circuit.curvature_1pm[row].abs() * fastest * fastest
+    };
+    let mut calmest = (f64::INFINITY, latest);
+    for row in (0..=latest).rev() {
+        let along = row..=row + (CALM_M / spacing) as usize;
+        let most = along.map(|i| across_mps2(i % count)).fold(0.0, f64::max);
+        if most < calmest.0 {
+            calmest = (most, row);
+        }
+        if most <= CALM_MPS2 {
+            break;
+        }
+    }
+    if calmest.1 == latest {
+        latest_m
+    } else {
+        calmest.1 as f64 * spacing
+    }
 }
 
 macro_rules! course {
@@ -251,7 +287,7 @@ impl Road<f64> {
                 .extend((0..padded).map(|i| plan.speed_mps[(i + cells - FRONT_CELLS) % cells]));
         }
         let plan_stride = (self.plans.len() - plan_at) / line.plans.len();
-        let begin = circuit.length_m - RUN_UP_M.min(0.4 * circuit.length_m);
+        let begin = run_up_m(line);
         let begin_row = ((begin / spacing) as usize).min(count - 1);
         let origin = circuit.centreline_m[begin_row];
         let (sin, cos) = circuit.heading_rad[begin_row].sin_cos();

@@ -8,11 +8,12 @@ use lapswarm::drive::{
     drive_planned, look,
 };
 use lapswarm::evaluate::drive::{DriveObjective, DriveProblem, DriveSettings};
-use lapswarm::track::{Circuit, CurvatureTable, FrictionAcross, Relief, ReliefChange, Track};
+use lapswarm::track::{Circuit, CurvatureRow, CurvatureTable, FrictionAcross, Relief, ReliefChange, Track};
 use lapswarm::vehicle::limits::SpeedRange;
 use lapswarm::vehicle::model::runge_kutta_step_on;
 use lapswarm::vehicle::wheels::moments_under;
 use lapswarm::vehicle::{Car, CarFacts, CarInput, CarModel, CarState};
+use std::f64::consts::PI;
 
 fn circuit(name: &str) -> Circuit {
     Track::load(name).and_then(|t| t.circuit()).expect(name)
@@ -446,6 +447,53 @@ fn a_driver_knows_a_car_with_much_downforce_at_every_speed() {
     map.figures = at_70.repeat(map.figures.len() / row);
     let strays_m = off_m(&of_one_speed, slow);
     assert!(strays_m > 0.2, "{strays_m} m");
+}
+
+/// Two straights of 600 m and two bends of 80 m radius, whose start line lies so far (m) beyond the middle of a bend.
+fn two_bends(beyond_m: f64) -> Circuit {
+    let (radius_m, clothoid_m, straight_m) = (80.0, 60.0, 600.0);
+    let half_arc_m = 0.5 * (PI * radius_m - clothoid_m);
+    let half_lap_m = straight_m + 2.0 * (half_arc_m + clothoid_m);
+    let rows = (0..2 * half_lap_m as usize).map(|i| {
+        let along_m = (i as f64 + beyond_m).rem_euclid(half_lap_m);
+        let from_middle_m = along_m.min(half_lap_m - along_m);
+        let curvature_1pm =
+            ((half_arc_m + clothoid_m - from_middle_m) / clothoid_m).clamp(0.0, 1.0) / radius_m;
+        CurvatureRow {
+            station_m: i as f64,
+            curvature_1pm,
+            width_left_m: 6.0,
+            width_right_m: 6.0,
+            corner: String::new(),
+        }
+    });
+    let table = CurvatureTable {
+        length_m: 2.0 * half_lap_m,
+        rows: rows.collect(),
+        ..CurvatureTable::circle(radius_m, 12.0, true)
+    };
+    table.build().expect("two bends").0
+}
+
+/// At 34.5 m/s bends of 80 m take nine tenths of the grip. A car that does not turn yet spins in the middle of one. So the run-up
+/// begins on the straight before, and the lap takes as long from any start line: a lap of 52.8 s ends within a step of 1 ms, and a car
+/// that settles leaves another.
+#[test]
+fn a_run_up_begins_where_the_car_need_not_turn() {
+    let car = bundled_car();
+    let settings = DriverSettings::racing(&car).expect("steady states");
+    let lap_s = |beyond_m: f64| {
+        let circuit = two_bends(beyond_m);
+        let plan = SpeedPlan::of_speeds(&[0.0], &[34.5], circuit.length_m);
+        let driven = drive_planned(&car, &circuit, plan, &settings, 0.01).expect("it gets round");
+        driven.lap_time_s(circuit.length_m, 0.01).expect("a lap")
+    };
+    // 500 m before the line there is the middle of a bend, or of a straight.
+    let (bend_s, straight_s) = (lap_s(500.0), lap_s(500.0 + 455.0));
+    assert!(
+        (bend_s - straight_s).abs() < 2e-3,
+        "{bend_s} s and {straight_s} s"
+    );
 }
 
 /// In a wide bend the car drives at the top of its envelope. The drag of its tyres there, some 180 N over a slip stiffness of 410 kN,

@@ -1,18 +1,20 @@
 //! Grip by corner: where the car holds more than on the whole lap, its plan takes more.
 //!
 //! The greatest share of the grip that a whole lap holds is that of its worst corner. From there the shares of all corners are raised
-//! together, step by step. Where the car is lost, or falls behind its plan, the corner goes back by a step and stays there. Each drive
-//! follows from the ones before, so that a resumed search ends with the same bits.
+//! together, step by step. Where the car is lost, or falls behind its plan, the corner goes back by a step and stays there. Which corner
+//! that is can only be guessed, and a slower plan may be driven faster. So at the end each corner alone is tried lower and higher. Each
+//! drive follows from the ones before, so that a resumed search ends with the same bits.
 
 use super::NamedLine;
 use super::drive::{DrivenLine, INTERVAL_S, keeps_up};
 use super::state::{CornerState, DriveState};
-use crate::drive::{Drive, DriverSettings, SpeedPlan, drive_until_lost};
+use crate::drive::{Drive, DriverSettings, Lost, SpeedPlan, drive_until_lost};
 use crate::error::{Error, Result};
 use crate::line::{BySection, EnvelopeTable, FineLine, LapProfile, PointMass};
 use crate::study::framework::Progress;
 use crate::study::framework::state_file::StateFile;
 use crate::vehicle::{Car, Traction};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -86,6 +88,9 @@ fn corners_of(v_mps: &[f64], ay_mps2: &[f64]) -> (Vec<usize>, usize) {
     }
     (corner_of, corner + 1)
 }
+
+/// A lap that was driven, where the car was lost, and its time (s) if it came round.
+type Driven = (Drive, Option<Lost>, Option<f64>);
 
 /// The plans of a line, each corner with a share of the grip of its own.
 struct Corners<'a> {
@@ -214,11 +219,14 @@ pub(super) fn raise(
         best: vec![0; corners.count],
         best_s: base.lap_time_s,
         accepted: true,
+        trial: 0,
         drives: 0,
     });
-    let drive = |lap: &LapProfile| {
+    let drive = |lap: &LapProfile| -> Result<Driven> {
         let plan = SpeedPlan::of_speeds(&lap.station_m, &lap.v_mps, corners.fine.length_m);
-        drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S, None)
+        let (driven, lost) = drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S, None)?;
+        let lap_time_s = driven.lap_time_s(line.circuit.length_m, INTERVAL_S);
+        Ok((driven, lost, lap_time_s))
     };
     loop {
         if found.accepted {
@@ -232,16 +240,16 @@ pub(super) fn raise(
             found.accepted = false;
         }
         let done = (state.tried + found.drives) as u64;
-        let planned = done + (top - found.levels.iter().copied().min().unwrap_or(top)) as u64 + 1;
+        let steps = top - found.levels.iter().copied().min().unwrap_or(top) + 1 + 2 * corners.count;
+        let planned = done + steps as u64;
         if observe(&Progress::counted(done, planned)).is_break() {
             state.corners = Some(found);
             state_file.save(state)?;
             return Ok(None);
         }
         let lap = corners.lap(&found.levels)?;
-        let (driven, lost) = drive(&lap)?;
+        let (driven, lost, whole_s) = drive(&lap)?;
         found.drives += 1;
-        let whole_s = driven.lap_time_s(line.circuit.length_m, INTERVAL_S);
         let blamed = match (&lost, whole_s) {
             (Some(lost), _) => lowered_from(corners.at(lost.station_m), &found.levels),
             (None, Some(lap_time_s)) if !keeps_up(lap_time_s / lap.time_s - 1.0) => {
@@ -261,18 +269,26 @@ pub(super) fn raise(
             }
             (None, None) => None,
         };
-        // No corner is left that takes more than the whole lap.
-        let Some(corner) = blamed else {
-            break;
-        };
-        found.levels[corner] -= 1;
-        found.frozen[corner] = true;
+        match blamed {
+            Some(corner) => {
+                found.levels[corner] -= 1;
+                found.frozen[corner] = true;
+            }
+            // No corner is left that takes more than the whole lap.
+            None => {
+                found.frozen.fill(true);
+                found.accepted = true;
+            }
+        }
         keep(state, &found, state_file);
+    }
+    if !try_alone((&corners, &drive), &mut found, state, state_file, observe)? {
+        return Ok(None);
     }
 
     let lap = corners.lap(&found.best)?;
-    let (driven, _) = drive(&lap)?;
-    let Some(lap_time_s) = driven.lap_time_s(line.circuit.length_m, INTERVAL_S) else {
+    let (driven, _, lap_time_s) = drive(&lap)?;
+    let Some(lap_time_s) = lap_time_s else {
         return Err(Error::Study(
             "the fastest lap did not come round again".to_owned(),
         ));
@@ -314,6 +330,68 @@ pub(super) fn raise(
         drives,
         ..base
     }))
+}
+
+/// Tries each corner alone a step lower, and then each a step higher, on the fastest lap so far. What is faster is taken, and tried a
+/// step further. False if the observer ends it.
+fn try_alone(
+    (corners, drive): (&Corners<'_>, &(impl Fn(&LapProfile) -> Result<Driven> + Sync)),
+    found: &mut CornerState,
+    state: &mut DriveState,
+    state_file: &mut StateFile,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<bool> {
+    let held_s = |levels: &[usize]| -> Result<Option<f64>> {
+        let lap = corners.lap(levels)?;
+        let (_, lost, lap_time_s) = drive(&lap)?;
+        Ok(lap_time_s.filter(|lap_time_s| lost.is_none() && keeps_up(lap_time_s / lap.time_s - 1.0)))
+    };
+    // A few at once. Those behind the first that is faster do not count, so that their number changes no result.
+    let together = rayon::current_num_threads().max(2);
+    let (trials, top) = (2 * corners.count, corners.shares.len() - 1);
+    while found.trial < trials {
+        let done = (state.tried + found.drives) as u64;
+        let planned = done + (trials - found.trial) as u64;
+        if observe(&Progress::counted(done, planned)).is_break() {
+            state.corners = Some(found.clone());
+            state_file.save(state)?;
+            return Ok(false);
+        }
+        let batch: Vec<(usize, Vec<usize>)> = (found.trial..trials)
+            .filter_map(|number| Some((number, one_step(number, &found.best, top)?)))
+            .take(together)
+            .collect();
+        let laps_s: Vec<Option<f64>> = batch
+            .par_iter()
+            .map(|(_, levels)| held_s(levels))
+            .collect::<Result<_>>()?;
+        let next = batch.last().map_or(trials, |(number, _)| number + 1);
+        let faster =
+            |(i, lap_s): (usize, &Option<f64>)| Some((i, lap_s.filter(|lap_s| *lap_s < found.best_s)?));
+        let faster = laps_s.iter().enumerate().find_map(faster);
+        found.drives += faster.map_or(batch.len(), |(i, _)| i + 1);
+        match faster {
+            Some((i, lap_s)) => {
+                (found.trial, found.best) = batch[i].clone();
+                found.best_s = lap_s;
+            }
+            None => found.trial = next,
+        }
+        keep(state, found, state_file);
+    }
+    Ok(true)
+}
+
+/// The trial of this number: the shares with one corner a step lower, or later a step higher. Nothing at the end of its shares.
+fn one_step(number: usize, best: &[usize], top: usize) -> Option<Vec<usize>> {
+    let corner = number % best.len();
+    let mut levels = best.to_vec();
+    levels[corner] = if number < best.len() {
+        levels[corner].checked_sub(1)?
+    } else {
+        Some(levels[corner] + 1).filter(|level| *level <= top)?
+    };
+    Some(levels)
 }
 
 /// The corner that goes back by a step where a car is lost in one: itself, or the last before it that takes more than the whole lap.
@@ -368,6 +446,14 @@ mod tests {
         assert_eq!(first, [0; 3]);
         assert_eq!((corner_of[10], corner_of[39]), (1, 1));
         assert_eq!((corner_of[50], corner_of[58]), (2, 2));
+    }
+
+    #[test]
+    fn each_corner_is_tried_lower_and_then_higher() {
+        let trials: Vec<_> = (0..6).map(|number| one_step(number, &[1, 0, 3], 3)).collect();
+        let tried = [[0, 0, 3], [1, 0, 2], [2, 0, 3], [1, 1, 3]].map(|levels| Some(levels.to_vec()));
+        let [first, third, fourth, fifth] = tried;
+        assert_eq!(trials, [first, None, third, fourth, fifth, None]);
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub(super) struct CornerState {
     pub best_s: f64,
     /// Whether the car held the shares that it was driven with last.
     pub accepted: bool,
+    /// Trials of one corner alone that have ended.
+    pub trial: usize,
     /// Laps driven.
     pub drives: usize,
 }
