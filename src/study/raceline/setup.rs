@@ -302,8 +302,7 @@ impl Setup {
             return Vec::new();
         }
         let mut words = vec![
-            "the road has height or banking: laps are those of three dimensions, lengths and curvatures those of the map; steps of the \
-             solver of the fastest line leave out what a line gains by going up or down the banking"
+            "the road has height or banking: laps are those of three dimensions, lengths and curvatures those of the map"
                 .to_owned(),
         ];
         if self.car.envelope.loads().is_empty() {
