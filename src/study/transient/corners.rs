@@ -282,7 +282,12 @@ pub(super) fn raise(
         }
         keep(state, &found, state_file);
     }
-    if !try_alone((&corners, &drive), &mut found, state, state_file, observe)? {
+    let held_s = |levels: &[usize]| -> Result<Option<f64>> {
+        let lap = corners.lap(levels)?;
+        let (_, lost, lap_time_s) = drive(&lap)?;
+        Ok(lap_time_s.filter(|lap_time_s| lost.is_none() && keeps_up(lap_time_s / lap.time_s - 1.0)))
+    };
+    if !try_alone((&held_s, top), &mut found, state, state_file, observe)? {
         return Ok(None);
     }
 
@@ -333,22 +338,18 @@ pub(super) fn raise(
 }
 
 /// Tries each corner alone a step lower, and then each a step higher, on the fastest lap so far. What is faster is taken, and tried a
-/// step further. False if the observer ends it.
+/// step further. `held_s` is the time (s) of a lap on which the car holds its shares, and `top` the greatest of them. False if the
+/// observer ends it.
 fn try_alone(
-    (corners, drive): (&Corners<'_>, &(impl Fn(&LapProfile) -> Result<Driven> + Sync)),
+    (held_s, top): (&(impl Fn(&[usize]) -> Result<Option<f64>> + Sync), usize),
     found: &mut CornerState,
     state: &mut DriveState,
     state_file: &mut StateFile,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<bool> {
-    let held_s = |levels: &[usize]| -> Result<Option<f64>> {
-        let lap = corners.lap(levels)?;
-        let (_, lost, lap_time_s) = drive(&lap)?;
-        Ok(lap_time_s.filter(|lap_time_s| lost.is_none() && keeps_up(lap_time_s / lap.time_s - 1.0)))
-    };
     // A few at once. Those behind the first that is faster do not count, so that their number changes no result.
     let together = rayon::current_num_threads().max(2);
-    let (trials, top) = (2 * corners.count, corners.shares.len() - 1);
+    let trials = 2 * found.best.len();
     while found.trial < trials {
         let done = (state.tried + found.drives) as u64;
         let planned = done + (trials - found.trial) as u64;
@@ -412,6 +413,7 @@ fn keep(state: &mut DriveState, found: &CornerState, state_file: &mut StateFile)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::transient::TransientSettings;
 
     /// Three straights of 60, 50 and 40 m/s: a dip of 2 m/s on the first is no corner. Numbers begin at the greatest speed, and the
     /// last corner passes the start line.
@@ -454,6 +456,42 @@ mod tests {
         let tried = [[0, 0, 3], [1, 0, 2], [2, 0, 3], [1, 1, 3]].map(|levels| Some(levels.to_vec()));
         let [first, third, fourth, fifth] = tried;
         assert_eq!(trials, [first, None, third, fourth, fifth, None]);
+    }
+
+    /// The first corner is driven fastest two steps lower, the second two steps higher, of which it holds one, and the third as it is.
+    /// Seven laps tell, however many are driven at once.
+    #[test]
+    fn what_is_faster_alone_is_taken_and_tried_further() {
+        let off = |level: usize, best: usize| (level as f64 - best as f64).powi(2);
+        let held_s = |levels: &[usize]| {
+            let lap_s = 100.0 + off(levels[0], 1) + off(levels[1], 2) + off(levels[2], 0);
+            Ok(Some(lap_s).filter(|_| levels[1] < 2))
+        };
+        let mut found = CornerState {
+            levels: vec![3, 0, 0],
+            frozen: vec![true; 3],
+            best: vec![3, 0, 0],
+            best_s: 108.0,
+            accepted: true,
+            trial: 0,
+            drives: 0,
+        };
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut state = DriveState::new(TransientSettings::default());
+        let mut state_file = StateFile::at(folder.path().join("checkpoint.bin"));
+        let mut observe = |_: &Progress| ControlFlow::Continue(());
+        let ended = try_alone(
+            (&held_s, 3),
+            &mut found,
+            &mut state,
+            &mut state_file,
+            &mut observe,
+        );
+        assert!(ended.expect("trials"));
+        assert_eq!(
+            (found.best, found.best_s, found.drives),
+            (vec![1, 1, 0], 101.0, 7)
+        );
     }
 
     #[test]
