@@ -490,6 +490,7 @@ class DrivenLine(Figures):
     rule: str
     margin_m: float
     greatest_offset_m: float
+    heading_gain: float
     beyond: str | None
     warnings: list[str]
     corners: list[CornerGrip]

@@ -268,7 +268,18 @@ fn guess(path: &Path) -> Result<Kind> {
     // A log may be larger than any text, and need not be UTF-8.
     let start = read_start(path, HEAD)?;
     let start = String::from_utf8_lossy(&start);
-    let head = start.lines().next().unwrap_or_default().to_lowercase();
+    // The header may be the last of the comments at the top.
+    let is_comment = |line: &&str| line.starts_with('#');
+    let header = start.lines().take_while(is_comment).last();
+    let mut others = start
+        .lines()
+        .filter(|line| !is_comment(line) && !line.trim().is_empty());
+    let first = others.next().unwrap_or_default();
+    let is_row = first
+        .split([',', ';', '\t'])
+        .next()
+        .is_some_and(|cell| cell.trim().parse::<f64>().is_ok());
+    let head = header.filter(|_| is_row).unwrap_or(first).to_lowercase();
     let names: Vec<&str> = head
         .split([',', ';', '\t'])
         .map(|cell| cell.trim_matches(['#', '"', ' ', '\r']))
@@ -285,7 +296,7 @@ fn guess(path: &Path) -> Result<Kind> {
         .any(|name| *name == "t" || name.starts_with("t ") || name.contains("time"));
     Ok(if has(&["v_mps", "ay_mps2"]) {
         Kind::File(&ENVELOPE)
-    } else if begins("station") && begins("alpha") {
+    } else if begins("station") && begins("alpha") || has(&["x_m", "y_m", "psi_rad"]) && !begins("w") {
         Kind::File(&LINE)
     } else if (in_plane || on_globe) && !timed {
         Kind::File(&TRACK)

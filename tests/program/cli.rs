@@ -339,6 +339,22 @@ fn what_is_wrong_is_named_with_its_place_and_code_two() {
     assert_eq!(unknown.status.code(), Some(2), "{}", text(&unknown.stderr));
 }
 
+/// The optimiser of the racetrack database writes two comments and the header as a third.
+#[test]
+fn a_line_of_another_program_is_known_by_its_header() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let rows = (0..12).map(|i| {
+        let (y, x) = (f64::from(i) * std::f64::consts::TAU / 12.0).sin_cos();
+        format!("{i}; {x}; {y}; 0.0; 0.01; 30.0; 0.0\n")
+    });
+    let header = "# 6a3f9c\n# 0b1e\n# s_m; x_m; y_m; psi_rad; kappa_radpm; vx_mps; ax_mps2\n";
+    let text_of_line = header.to_owned() + &rows.collect::<String>();
+    std::fs::write(folder.path().join("line.csv"), text_of_line).expect("a file");
+    let checked = lapswarm(folder.path(), &["check", "line.csv"]);
+    assert_eq!(checked.status.code(), Some(0), "{}", text(&checked.stderr));
+    assert_eq!(text(&checked.stdout).trim(), "line.csv: a line of 12 points");
+}
+
 /// What is refused, wherever it is found, leaves no folder that stands in the way of the same run with better input, nor takes
 /// one away that was there.
 #[test]

@@ -8,7 +8,7 @@
 use super::NamedLine;
 use super::drive::{DrivenLine, INTERVAL_S, keeps_up};
 use super::state::{CornerState, DriveState};
-use crate::drive::{Drive, DriverSettings, Lost, SpeedPlan, drive_until_lost};
+use crate::drive::{Drive, Lost, SpeedPlan, drive_until_lost};
 use crate::error::{Error, Result};
 use crate::line::{BySection, EnvelopeTable, FineLine, LapProfile, PointMass};
 use crate::study::framework::Progress;
@@ -201,7 +201,7 @@ impl<'a> Corners<'a> {
 /// Those of the drives, and of saving the state.
 pub(super) fn raise(
     (car, limits, line): (&Car, &PointMass, &NamedLine),
-    (driver, shares): (&DriverSettings, &[f64]),
+    shares: &[f64],
     base: DrivenLine,
     state: &mut DriveState,
     state_file: &mut StateFile,
@@ -224,7 +224,7 @@ pub(super) fn raise(
     });
     let drive = |lap: &LapProfile| -> Result<Driven> {
         let plan = SpeedPlan::of_speeds(&lap.station_m, &lap.v_mps, corners.fine.length_m);
-        let (driven, lost) = drive_until_lost(car, &line.circuit, plan, driver, INTERVAL_S, None)?;
+        let (driven, lost) = drive_until_lost(car, &line.circuit, plan, &base.driver, INTERVAL_S, None)?;
         let lap_time_s = driven.lap_time_s(line.circuit.length_m, INTERVAL_S);
         Ok((driven, lost, lap_time_s))
     };

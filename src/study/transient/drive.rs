@@ -21,6 +21,10 @@ pub const INTERVAL_S: f64 = 0.01;
 /// How much slower than the quasi-steady-state lap a driven lap may be, as a share of it.
 pub const AGREEMENT: f64 = 0.005;
 
+/// How much drivers steer against an angle to the path (rad per rad). Which is best depends on car and line: more follows the line more
+/// closely, until the car swings.
+pub const HEADING_GAINS: [f64; 4] = [1.0, 1.2, 1.4, 1.6];
+
 /// Whether a driven lap, this much longer than its plan as a share of it, keeps up with the plan. One that is shorter does: the car cuts
 /// the corners of a line that turns to and fro.
 pub fn keeps_up(disagreement: f64) -> bool {
@@ -33,6 +37,8 @@ pub struct DrivenLine {
     /// The greatest share of the envelope's grip that the car and the driver held on the whole lap; where the laps agree with none,
     /// the share of the fastest driven lap.
     pub grip_share: f64,
+    /// How the driver drives: the fastest of those with [`HEADING_GAINS`].
+    pub driver: DriverSettings,
     /// The share that they held in each corner, where that was looked for.
     pub corners: Vec<CornerGrip>,
     /// The quasi-steady-state lap with all of the grip (s), where corners were looked at.
@@ -79,7 +85,7 @@ pub(super) fn drive(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     Ok(found.map(|mut found| {
         let elapsed_s = watch.elapsed_s();
         record.took(
-            (found.failures.len() + found.drives) as u64 + 1,
+            (HEADING_GAINS.len() * (found.failures.len() + 1) + found.drives) as u64,
             elapsed_s,
             elapsed_s,
         );
@@ -105,7 +111,11 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         observe,
         ..
     } = work;
-    let driver = DriverSettings::racing(car)?;
+    let racing = DriverSettings::racing(car)?;
+    let drivers = HEADING_GAINS.map(|heading_gain| DriverSettings {
+        heading_gain,
+        ..racing.clone()
+    });
     // The greatest first.
     let shares: Vec<f64> = settings.shares().into_iter().rev().collect();
     let mut inputs = Inputs::new("transient");
@@ -143,12 +153,20 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         };
         // In the engine's place the motor adds nothing to what the driver can have.
         let adds = motor.as_ref().is_some_and(|motor| motor.mode == Mode::Additional);
-        let motor = adds.then_some(&torque_nm as MotorTorque<'_>);
-        let drive = drive_with_motor(car, circuit, plan, &driver, INTERVAL_S, motor)?;
-        let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
-        Ok(lap_time_s.map(|lap_time_s| DrivenLine {
+        let driven = drivers.par_iter().map(|driver| {
+            let motor = adds.then_some(&torque_nm as MotorTorque<'_>);
+            let drive = drive_with_motor(car, circuit, plan.clone(), driver, INTERVAL_S, motor)?;
+            let lap_time_s = drive.lap_time_s(circuit.length_m, INTERVAL_S);
+            Ok(lap_time_s.map(|lap_time_s| (lap_time_s, (driver, drive))))
+        });
+        let driven: Vec<Result<_>> = driven.collect();
+        let Some((lap_time_s, (driver, drive))) = fastest(driven)? else {
+            return Ok(None);
+        };
+        Ok(Some(DrivenLine {
             ideal,
             grip_share: share,
+            driver: driver.clone(),
             corners: Vec::new(),
             full_grip_s: None,
             drives: 0,
@@ -171,7 +189,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     if state.corners.is_some()
         && let Some(base) = best
     {
-        return raise(parts, (&driver, &shares), base, &mut state, state_file, observe);
+        return raise(parts, &shares, base, &mut state, state_file, observe);
     }
     let planned = shares.len();
     // A few at once: the greatest that works ends the search.
@@ -197,14 +215,7 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
                             state.tried = end;
                             return Ok(Some(outcome));
                         }
-                        return raise(
-                            parts,
-                            (&driver, &shares),
-                            outcome,
-                            &mut state,
-                            state_file,
-                            observe,
-                        );
+                        return raise(parts, &shares, outcome, &mut state, state_file, observe);
                     }
                     // It gets round, but more slowly than its plan: the limits are not held yet.
                     let why = format!(
@@ -243,6 +254,27 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
     )))
 }
 
+/// The fastest of several laps with their times (s); where none came round, what became of the first.
+fn fastest<T>(driven: Vec<Result<Option<(f64, T)>>>) -> Result<Option<(f64, T)>> {
+    let (mut best, mut lost): (Option<(f64, T)>, _) = (None, None);
+    for lap in driven {
+        match lap {
+            Ok(Some(lap)) => {
+                if best.as_ref().is_none_or(|(best_s, _)| lap.0 < *best_s) {
+                    best = Some(lap);
+                }
+            }
+            Ok(None) => {}
+            Err(error @ Error::Study(_)) => lost = lost.or(Some(error)),
+            Err(error) => return Err(error),
+        }
+    }
+    match (best, lost) {
+        (None, Some(lost)) => Err(lost),
+        (best, _) => Ok(best),
+    }
+}
+
 /// Room that a driver needs to correct on his steering lock, as a share of it.
 const LOCK_SPARE: f64 = 0.05;
 
@@ -263,4 +295,27 @@ fn beyond_lock(car: &Car, points_m: &[DVec2]) -> Result<String> {
     } else {
         String::new()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fastest_driver_is_taken() {
+        let lost = |why: &str| Err(Error::Study(why.to_owned()));
+        let driven = vec![
+            lost("spins"),
+            Ok(Some((81.0, 'b'))),
+            Ok(Some((80.0, 'c'))),
+            Ok(None),
+        ];
+        assert_eq!(fastest(driven).expect("laps"), Some((80.0, 'c')));
+        assert_eq!(fastest::<char>(vec![Ok(None)]).expect("no lap"), None);
+        let all_lost = fastest::<char>(vec![lost("spins"), lost("leaves the track")]);
+        assert_eq!(all_lost.expect_err("none comes round").to_string(), "spins");
+        let bad = Err(Error::input("the line", "points", "2", "a lap"));
+        let bad = fastest(vec![Ok(Some((80.0, 'c'))), bad]);
+        assert!(matches!(bad, Err(Error::Input { .. })));
+    }
 }

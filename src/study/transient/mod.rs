@@ -15,7 +15,7 @@ mod settings;
 mod state;
 
 pub use corners::CornerGrip;
-pub use drive::{AGREEMENT, DrivenLine, INTERVAL_S, keeps_up};
+pub use drive::{AGREEMENT, DrivenLine, HEADING_GAINS, INTERVAL_S, keeps_up};
 pub use energy::{Accounts, EnergyFigures, Ideal, Motor};
 pub use population::{Driven, DrivenBest, PopulationOutcome, drive_problem};
 pub use population_results::{Entry, PopulationSummary};

@@ -50,6 +50,8 @@ pub struct LineSummary {
     pub margin_m: f64,
     /// Greatest distance of the car from the line (m).
     pub greatest_offset_m: f64,
+    /// How much the driver steers against an angle to the path (rad per rad): that with which the lap is fastest.
+    pub heading_gain: f64,
     /// What became of the car at the least share that failed.
     pub beyond: Option<String>,
     /// What limits the result, in words.
@@ -83,6 +85,7 @@ impl LineSummary {
             rule: rule.to_owned(),
             margin_m: outcome.margin_m,
             greatest_offset_m: outcome.drive.offset_m.iter().fold(0.0, |a, b| a.max(b.abs())),
+            heading_gain: outcome.driver.heading_gain,
             beyond: outcome.failures.last().map(|(_, why)| why.clone()),
             warnings: off_road(&outcome.line).into_iter().collect(),
             corners: outcome.corners.clone(),
@@ -114,7 +117,8 @@ impl LineSummary {
         });
         format!(
             "{} drives the line in {:.3} s, with {:.0}% of the envelope's grip{by_corner}; the quasi-steady-state lap with as much takes \
-             {:.3} s ({:+.2}%{}).\n{all}{beyond}Chosen: {}.\nAt most {:.2} m off the line; {:.2} m left between the car's side and the edge.\n",
+             {:.3} s ({:+.2}%{}).\n{all}{beyond}Chosen: {}.\nAt most {:.2} m off the line; {:.2} m left between the car's side and the edge.\n\
+             The driver steers {:.1} rad against each rad off the path.\n",
             self.head.subject.car,
             self.lap_time_s,
             100.0 * self.grip_share,
@@ -127,7 +131,8 @@ impl LineSummary {
             },
             self.rule,
             self.greatest_offset_m,
-            self.margin_m
+            self.margin_m,
+            self.heading_gain
         ) + &self.energy.as_ref().map_or(String::new(), EnergyFigures::to_text)
             + &self
                 .warnings

@@ -1,5 +1,6 @@
 //! Settings of a drive.
 
+use super::HEADING_GAINS;
 use crate::config::kinds::{
     Kind, NameOrFile, choice, count, file, files, name_or_file, number, numbers, optional, text, texts,
 };
@@ -84,7 +85,12 @@ impl TransientSettings {
 
     /// Laps to drive, at the most.
     pub fn laps(&self) -> usize {
-        (self.setups.unwrap_or(0) + 1) * self.line.len().max(1) * self.shares().len()
+        let drivers = if self.is_population() {
+            1
+        } else {
+            HEADING_GAINS.len()
+        };
+        (self.setups.unwrap_or(0) + 1) * self.line.len().max(1) * self.shares().len() * drivers
     }
 
     /// What a population keeps in memory.
