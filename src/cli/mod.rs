@@ -38,7 +38,7 @@ use std::time::{Duration, Instant};
 enum Tool {
     /// Run the same study over a grid of settings and seeds, with medians.
     Sweep(sweep::Arguments),
-    /// The thesis's tables, chapter by chapter, with the published figures beside ours.
+    /// Make the thesis's tables, chapter by chapter, with the published figures beside ours.
     Reproduce(reproduce::Arguments),
     /// Drive a car round a circuit and log it.
     Simulate(simulate::Arguments),
@@ -65,17 +65,19 @@ enum Tool {
 
 /// The whole command line.
 fn command() -> Command {
-    let command = Command::new("lapswarm")
+    let studies = STUDIES.iter().map(|study| study::command(*study));
+    let command = Tool::augment_subcommands(Command::new("lapswarm").subcommands(studies));
+    command
         .version(env!("CARGO_PKG_VERSION"))
-        .about("Evaluate whole swarms of race cars at once.")
+        // After the tools, which bring words of their own.
+        .about("Evaluate whole swarms of race cars at once")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .after_help(
             "Exit codes: 0 done, 1 the study failed to reach what it was asked to, 2 bad input, 3 no usable device, 130 \
              interrupted (what was reached is saved).\n\nExamples:\n  lapswarm run\n  lapswarm identify study.toml --seed 7 \
              --json\n  lapswarm simulate --rate 100 --out lap\n  lapswarm devices",
-        );
-    Tool::augment_subcommands(command.subcommands(STUDIES.iter().map(|study| study::command(*study))))
+        )
 }
 
 /// Flags of everything that writes into a run folder.

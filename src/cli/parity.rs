@@ -21,7 +21,7 @@ use std::time::Instant;
 )]
 pub struct Arguments {
     /// What to hold against the f64 reference [default: all there is]
-    #[arg(long, value_parser = backend_flag, default_value = "auto")]
+    #[arg(long, value_parser = backend_flag, default_value = "auto", hide_default_value = true)]
     backend: BackendChoice,
     /// Part of the name of the GPU to use
     #[arg(long)]

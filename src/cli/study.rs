@@ -57,7 +57,7 @@ pub fn command(study: &'static dyn Registered) -> Command {
     let declared = study.declared().into_iter();
     command
         // After the others' flags, which bring words of their own.
-        .about(study.about())
+        .about(study.about().trim_end_matches('.'))
         .after_help(study.details())
         .args(declared.filter_map(|d| argument(study, &d)))
 }

@@ -683,8 +683,8 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
     let setups = [line.as_slice(), &["--setups", "3", "--backend", "simd"]].concat();
     // Each with an evaluation's number where one is known beforehand: of the adaptive swarms 128 * 50 + 64 * 1500; of three
     // parameters a base car, four levels of each and eight samples of five; 5 * 5; four set-ups with 21 shares of the grip;
-    // 71 of these alone; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each; speeds of 18,
-    // 38 and 58 m/s by 128 steering angles.
+    // 71 of these alone, each by four drivers; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each;
+    // speeds of 18, 38 and 58 m/s by 128 steering angles.
     let studies: &[(&str, &[&str], Option<u64>)] = &[
         ("run", &[], None),
         ("identify", &[], Some(128 * 50 + 64 * 1500)),
@@ -697,7 +697,7 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
             Some(1 + 3 * 4 + 8 * 5),
         ),
         ("surface", &["--grid", "5"], Some(25)),
-        ("transient", &line, Some(71)),
+        ("transient", &line, Some(4 * 71)),
         ("transient", &setups, Some(4 * 21)),
         ("simulate", &["--noise", "0.1,0,0,0"], Some(1)),
         ("sweep", &["thesis_inertia"], Some(48 * 5000)),
@@ -843,8 +843,15 @@ fn helps_and_errors_are_whole() {
         let help = lapswarm(folder.path(), &[study.name(), "--help"]);
         let help = text(&help.stdout);
         let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(words(&help).starts_with(&words(study.about())), "{help}");
+        let about = study.about().trim_end_matches('.');
+        assert!(words(&help).starts_with(&words(about)), "{help}");
     }
+    let whole = lapswarm(folder.path(), &["--help"]);
+    let whole = text(&whole.stdout);
+    assert!(
+        whole.starts_with("Evaluate whole swarms of race cars at once\n"),
+        "{whole}"
+    );
     let help = lapswarm(folder.path(), &["raceline", "--help"]);
     let help = text(&help.stdout)
         .split_whitespace()
