@@ -143,5 +143,12 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
+/// The cells of a line of a table, without the quotes and spaces round them. None holds a separator.
+#[cfg(feature = "vehicle")]
+pub(crate) fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
+    line.split(separator)
+        .map(|cell| cell.trim().trim_matches('"').trim())
+}
+
 /// The longest name of a car, a circuit, a section or a scenario (bytes): names become parts of files' names, which end at 255.
 pub const LONGEST_NAME: usize = 120;

@@ -1,6 +1,6 @@
 //! Lines in tables.
 
-use crate::config::read_text;
+use crate::config::{cells, read_text};
 use crate::error::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
@@ -82,11 +82,6 @@ fn header_of<const N: usize>(header: &str, names: [&str; N]) -> Option<(char, us
     Some((separator, cells.len(), columns))
 }
 
-fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
-    let cells = line.split(separator);
-    cells.map(|cell| cell.trim().trim_matches('"').trim())
-}
-
 /// As [`read_line`], points at least `spacing_m` apart.
 ///
 /// # Errors
@@ -145,10 +140,13 @@ mod tests {
     }
 
     #[test]
-    fn the_line_of_a_file_that_is_wrong_is_named() {
+    fn a_table_of_something_else_is_refused_by_its_place() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("line.csv");
         for (text, place) in [
+            ("a,b\n1,2\n", "line 1"),
+            ("x_m,y_m\n1,2\n3,oops\n", "line 3"),
+            ("x_m,y_m\n1,2\n", "rows"),
             ("# x_m,y_m\n0,0\n# a remark\n1,nan\n", "line 4"),
             ("# a remark\n\n0,0\n1,1\n", "line 3"),
             ("# x_m;y_m\n0;0\n1;1;1\n", "line 3"),

@@ -5,6 +5,7 @@ use super::super::relief::{HEIGHTS_M, STEEPEST_BANK_DEG};
 use super::check::FURTHEST_M;
 use super::geographic::{self, Fix};
 use super::{MOST_POINTS, Raw, WIDEST_M};
+use crate::config::cells;
 use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
@@ -79,11 +80,6 @@ fn shown(cell: &str) -> String {
         short.push_str("...");
     }
     format!("`{short}`")
-}
-
-fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
-    line.split(separator)
-        .map(|cell| cell.trim().trim_matches('"').trim())
 }
 
 struct Table<'a> {
