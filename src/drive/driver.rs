@@ -17,8 +17,6 @@ use std::f64::consts::TAU;
 pub(super) const PEDAL_LAG_S: f64 = 0.06;
 /// Time constant of the driver's arms, s.
 pub(super) const STEER_LAG_S: f64 = 0.04;
-/// Greatest rate at which a driver's arms turn the front wheels, rad/s; a car may have slower steering.
-const STEER_RATE: f64 = 0.9;
 /// Steering that a driver who does not know the car adds for understeer, rad per g and metre of wheelbase.
 const UNDERSTEER: f64 = 0.0025;
 /// Lateral acceleration (g) that such a driver takes for all of the grip; his steering goes with it.
@@ -103,7 +101,7 @@ impl DriverTable<f64> {
             slip_limit: settings.slip_limit,
             slip_stiffness: settings.slip_stiffness,
             max_steer: car.max_steer_rad,
-            steer_rate: car.max_steer_rate_radps.min(STEER_RATE),
+            steer_rate: car.max_steer_rate_radps,
             knows: f64::from(u8::from(settings.knowledge.is_some())),
             run_off: run_off_m,
             driven_share: DRIVEN_SHARE,

@@ -28,6 +28,8 @@ pub struct ReferenceSolvers {
     smooth: (LineMap, Bounds),
     /// The minimum-curvature line, from which the smooth lines are measured.
     base: Vec<f64>,
+    /// How much closer its tightest bend asks [`STAGES`] to be: all lengths in them are this share of what they say.
+    fineness: f64,
     envelope: Option<PointMassEnvelope>,
     car: PointMass,
     entry_mps: f64,
@@ -116,6 +118,10 @@ const STRAIGHTS: f64 = 3.0;
 /// greater part of a short lap.
 const SHORT_M: f64 = 1400.0;
 const CLOSEST: f64 = 0.7;
+/// The stages are as they stand where the tightest bend turns a line by a radian in this length (m) or a greater one. Where one is
+/// tighter, as on tracks of karts and of Formula Student, they are closer in proportion, down to this share.
+const TIGHT_M: f64 = 12.0;
+const FINEST: f64 = 0.2;
 /// A control takes as many of the track's own cross-sections at the least. A stage that would bring controls no closer than to this
 /// share of their distance is as the one before it.
 const CROSS_SECTIONS_TO_SAY_CONTROL: f64 = 1.25;
@@ -182,7 +188,9 @@ impl ReferenceSolvers {
         };
         let base = minimum_curvature_of(&curvature, &bounds, &start)?.x;
         let controls = (cross_sections.len() / CROSS_SECTIONS_PER_CONTROL).max(4);
+        let tightest_m = radian_m(&cross_sections.points(&base), cross_sections.closed);
         Ok(Self {
+            fineness: (tightest_m / TIGHT_M).clamp(FINEST, 1.0),
             smooth: LineMap::spline_about(cross_sections, &base, controls),
             every: (map, bounds),
             base,
@@ -341,8 +349,11 @@ impl ReferenceSolvers {
     /// [`STAGES`] as the track's cross-sections can say them: one that would not be closer is as its predecessor.
     fn stages(&self) -> [About; STAGES.len()] {
         let own_m = self.cross_sections.length_m / self.cross_sections.len() as f64;
-        let mut stages = STAGES;
-        let closer = (self.cross_sections.length_m / SHORT_M).clamp(CLOSEST, 1.0);
+        let mut stages = STAGES.map(|stage| About {
+            spacing_m: self.fineness * stage.spacing_m,
+            ..stage
+        });
+        let closer = (self.cross_sections.length_m / (self.fineness * SHORT_M)).clamp(CLOSEST, 1.0);
         for turn in 1..stages.len() {
             let (before, stage) = (stages[turn - 1], &mut stages[turn]);
             stage.spacing_m *= closer;
@@ -411,7 +422,7 @@ impl ReferenceSolvers {
         let settings = DescentSettings {
             least_gain: LEAST_GAIN_ABOUT,
             programs: how.programs * if hilly { PROGRAMS_IN_HILLS } else { 1 },
-            roughness_s: ROUGHNESS_S,
+            roughness_s: self.fineness.powf(1.5) * ROUGHNESS_S,
             ..DescentSettings::default()
         };
         let tightening = DescentSettings {
@@ -595,6 +606,29 @@ impl Driven {
             }
         }
     }
+}
+
+/// The shortest stretch in which a line turns by a radian (m); infinite where it does so nowhere.
+fn radian_m(points_m: &[DVec2], closed: bool) -> f64 {
+    let n = points_m.len();
+    let segments = n - usize::from(!closed);
+    let step = |s: usize| points_m[(s + 1) % n] - points_m[s % n];
+    let mut least_m = f64::INFINITY;
+    for first in 0..segments {
+        let (mut turned_rad, mut length_m) = (0.0f64, 0.5 * step(first).length());
+        let last = if closed { first + segments } else { segments };
+        for s in first + 1..last {
+            turned_rad += step(s - 1).angle_to(step(s));
+            length_m += 0.5 * (step(s - 1).length() + step(s).length());
+            if length_m >= least_m || turned_rad.abs() >= 1.0 {
+                break;
+            }
+        }
+        if turned_rad.abs() >= 1.0 {
+            least_m = least_m.min(length_m);
+        }
+    }
+    least_m
 }
 
 /// Shares of the usable width, none beyond its ends.

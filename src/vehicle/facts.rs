@@ -193,7 +193,8 @@ impl CarFacts {
             tyres: base.tyres,
             steering_ratio: self.steering_ratio,
             max_steer_rad: 0.5,
-            max_steer_rate_radps: USUAL_STEER_RATE_RADPS,
+            // The driver's hands turn no faster with another ratio.
+            max_steer_rate_radps: USUAL_STEER_RATE_RADPS * base.steering_ratio / self.steering_ratio,
             powertrain: Some(self.powertrain(top_mps, drag_area)),
             hybrid: None,
             reached: None,
@@ -453,6 +454,20 @@ mod tests {
             let path = folder.path().join("car.toml");
             assert_eq!(Car::load(path.to_str().unwrap()).unwrap(), car);
         }
+    }
+
+    #[test]
+    fn hands_turn_as_fast_with_any_ratio() {
+        let direct = CarFacts {
+            steering_ratio: 4.0,
+            ..CarFacts::default()
+        };
+        let rates_radps =
+            [CarFacts::default(), direct].map(|facts| facts.car().unwrap().max_steer_rate_radps);
+        assert_eq!(
+            rates_radps,
+            [USUAL_STEER_RATE_RADPS, 14.0 / 4.0 * USUAL_STEER_RATE_RADPS]
+        );
     }
 
     #[test]

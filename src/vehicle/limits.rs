@@ -13,6 +13,10 @@ use crate::scalar::bisected;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+/// The slowest speed that a car's own range begins at (m/s), and the share of the steering lock that it may need there.
+const LEAST_MPS: f64 = 4.0;
+const LOCK_SHARE: f64 = 0.95;
+
 /// Speeds that limits are looked for at, in even steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedRange {
@@ -31,6 +35,28 @@ impl SpeedRange {
         to_mps: 77.0,
         step_mps: 2.0,
     };
+
+    /// The usual range for `car`, begun at slower speeds as far as its steering lock leaves the limit to the tyres there. Below the
+    /// range, limits are those of its slowest speed, which has more downforce.
+    pub fn of(car: &Car) -> Self {
+        let Self {
+            from_mps, step_mps, ..
+        } = Self::USUAL;
+        let wheelbase_m = car.chassis.cg_to_front + car.chassis.cg_to_rear;
+        let cornering = steady_car(car).cornering(from_mps, STEER_TO_GRIP, Turn::Left);
+        let limit = cornering.iter().max_by(|a, b| a.ay_mps2.total_cmp(&b.ay_mps2));
+        let free_mps = limit.map_or(f64::INFINITY, |limit| {
+            // What the tyres' slip takes of the steering angle hardly depends on the speed; the bend takes the rest.
+            let slip_rad = limit.steer_rad - wheelbase_m * limit.ay_mps2 / from_mps.powi(2);
+            let left_rad = LOCK_SHARE * car.max_steer_rad - slip_rad;
+            (wheelbase_m * limit.ay_mps2 / left_rad.max(0.0)).sqrt()
+        });
+        let steps = ((from_mps - free_mps.max(LEAST_MPS)) / step_mps).floor();
+        Self {
+            from_mps: from_mps - step_mps * steps.max(0.0),
+            ..Self::USUAL
+        }
+    }
 
     /// How many speeds there are, whatever the engine does.
     pub fn most(&self) -> usize {
@@ -543,6 +569,24 @@ mod tests {
         }
         let slow = locked.speeds[0].row.ay_mps2;
         assert!((slow / (324.0 * 0.03 / 2.6) - 1.0).abs() < 0.05, "{slow}");
+    }
+
+    /// The bundled car reaches a circle of 15 m on its lock: below 16 m/s that is the limit. With a lock of 0.5 rad the tyres are it
+    /// down to 8 m/s, where there is less downforce than at 18.
+    #[test]
+    fn slow_bends_have_limits_of_their_own() {
+        let mut car = Car::bundled().unwrap();
+        assert_eq!(SpeedRange::of(&car), SpeedRange::USUAL);
+        car.max_steer_rad = 0.5;
+        let range = SpeedRange::of(&car);
+        assert!((8.0..=10.0).contains(&range.from_mps), "{range:?}");
+        let ay_mps2 = |range: &SpeedRange| car_envelope(&car, range).unwrap().envelope.at(8.0).ay_mps2;
+        assert!(ay_mps2(&range) < 0.99 * ay_mps2(&SpeedRange::USUAL));
+        // Beyond, rows are the same.
+        let [slow, usual] =
+            [range, SpeedRange::USUAL].map(|range| car_envelope(&car, &range).unwrap().envelope);
+        let before = slow.rows().len() - usual.rows().len();
+        assert_eq!(slow.rows()[before..], *usual.rows());
     }
 
     /// At 58 m/s the engine is the limit. With a rolling resistance of 0.013 and 1.1 of the mass to accelerate, force F and drag D

@@ -24,10 +24,11 @@ impl MassLimits {
     /// # Errors
     /// As [`car_envelope`].
     pub fn sweep(car: &Car, masses_kg: &[f64]) -> Result<Self> {
+        let range = SpeedRange::of(car);
         let limits = |mass_kg: &f64| {
             let mut car = car.clone();
             car.chassis.mass = *mass_kg;
-            let limits = car_envelope(&car, &SpeedRange::USUAL)?;
+            let limits = car_envelope(&car, &range)?;
             Ok((*mass_kg, limits.envelope.clone(), limits.traction()))
         };
         Ok(Self {

@@ -35,8 +35,8 @@ settings! {
             "A log that is held against the limits: CSV (ours, MoTeC i2, RaceChrono, others), MoTeC .ld or VBOX .vbo";
         channel_map: Option<PathBuf> ["-"] = None, optional(file()).example("\"channels.toml\""),
             "Channel names, units, signs and delays of the log, as TOML; without it they are guessed";
-        from_mps: f64 ["m/s"] = SpeedRange::USUAL.from_mps, number(3.0, 150.0),
-            "Slowest speed; below it the limits are taken to be its";
+        from_mps: Option<f64> ["m/s"] = None, optional(number(3.0, 150.0)).example("18.0"),
+            "Slowest speed, below which the limits are taken to be its; without it 18, or less where the lock leaves the limit to the tyres";
         to_mps: f64 ["m/s"] = SpeedRange::USUAL.to_mps, number(4.0, 160.0),
             "Greatest speed, if the engine goes that far";
         step_mps: f64 ["m/s"] = SpeedRange::USUAL.step_mps, number(0.05, 50.0),
@@ -50,13 +50,12 @@ settings! {
     }
 
     fn consistent(&self) -> Result<()> {
-        let least = self.from_mps + 1.0;
         if let (None, Some(map)) = (&self.log, &self.channel_map) {
             let found = format!("{}, without a log", map.display());
             return Err(Error::input("the study", "channel_map", found, "a log beside it"));
         }
-        if self.to_mps < least {
-            let expected = format!("{least} m/s or more, as from_mps is {}", self.from_mps);
+        if let Some(from_mps) = self.from_mps.filter(|from| self.to_mps < from + 1.0) {
+            let expected = format!("{} m/s or more, as from_mps is {from_mps}", from_mps + 1.0);
             return Err(Error::input("the study", "to_mps", self.to_mps.to_string(), expected));
         }
         Ok(())
@@ -103,14 +102,14 @@ impl Study for EnvelopeStudy {
     fn prepare(settings: &EnvelopeSettings) -> Result<Prepared> {
         let car = Car::load(&settings.car)?;
         settings.validate()?;
-        let speeds = settings.range().speeds_of(&car)?;
+        let speeds = settings.range(Some(&car)).speeds_of(&car)?;
         let log = settings.log.as_deref().map(|path| settings.read_log(path, &car));
         let log = log.transpose()?;
         Ok(Prepared { car, speeds, log })
     }
 
     fn size(settings: &EnvelopeSettings, prepared: Option<&Prepared>) -> Vec<MemoryItem> {
-        let speeds = prepared.map_or_else(|| settings.range().most(), |prepared| prepared.speeds.len());
+        let speeds = prepared.map_or_else(|| settings.range(None).most(), |prepared| prepared.speeds.len());
         let cars = settings.steers.saturating_mul(speeds);
         vec![MemoryItem::new("steers, at each speed", cars, CAR)]
     }
@@ -172,10 +171,11 @@ impl EnvelopeSettings {
         Log::read(path, &map.unwrap_or_default(), &LogOptions::of(car))
     }
 
-    /// The speeds that limits are looked for at.
-    fn range(&self) -> SpeedRange {
+    /// The speeds that limits are looked for at, those of `car` if it is known.
+    fn range(&self, car: Option<&Car>) -> SpeedRange {
+        let usual = car.map_or(SpeedRange::USUAL, SpeedRange::of);
         SpeedRange {
-            from_mps: self.from_mps,
+            from_mps: self.from_mps.unwrap_or(usual.from_mps),
             to_mps: self.to_mps,
             step_mps: self.step_mps,
         }

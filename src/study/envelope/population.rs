@@ -123,7 +123,7 @@ pub(super) fn measure(work: Work<'_, EnvelopeStudy>) -> Result<Option<Outcome>> 
     let settings = work.settings;
     let Prepared { car, speeds, log } = work.prepared;
     // Refuses a car that has no drive at these speeds.
-    let limits = car_envelope(car, &settings.range())?;
+    let limits = car_envelope(car, &settings.range(Some(car)))?;
     let lock = car.max_steer_rad.min(STEER_TO_GRIP);
     let last = settings.steers - 1;
     let steers: Vec<f64> = (0..=last).map(|i| lock * i as f64 / last as f64).collect();

@@ -106,8 +106,8 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
 /// Those of [`car_envelope`].
 pub(super) fn envelope_on(road: &CrossSections, car: &Car) -> Result<Envelope> {
     let limits = match &road.relief {
-        Some(relief) if !relief.is_level() => car_envelope_under_loads(car, &SpeedRange::USUAL)?,
-        _ => car_envelope(car, &SpeedRange::USUAL)?,
+        Some(relief) if !relief.is_level() => car_envelope_under_loads(car, &SpeedRange::of(car))?,
+        _ => car_envelope(car, &SpeedRange::of(car))?,
     };
     Ok(limits.envelope)
 }
