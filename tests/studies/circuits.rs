@@ -13,6 +13,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
+/// One of the ten made circuits.
+fn made_circuit(name: &str) -> Circuit {
+    let mut ten = Circuit::ten().into_iter();
+    ten.find(|circuit| circuit.name == name).expect("a made circuit")
+}
+
 fn settings(circuit: &Circuit, folder: &Path) -> RacelineSettings {
     let file = folder.join("circuit.csv");
     std::fs::write(&file, circuit.csv()).expect("a file");
@@ -58,10 +64,7 @@ fn lines_of_any_circuit_are_on_its_road() {
 #[test]
 fn a_figure_of_eight_has_a_fastest_line() {
     let folder = tempfile::tempdir().expect("a folder");
-    let circuit = Circuit::ten()
-        .into_iter()
-        .find(|circuit| circuit.name == "bridge");
-    let settings = settings(&circuit.expect("a bridge"), folder.path());
+    let settings = settings(&made_circuit("bridge"), folder.path());
     let setup = set_up(&settings).expect("a circuit");
     assert_eq!(setup.road.bridges().len(), 1);
     let solvers = setup.solvers(&settings, &Arc::default()).expect("solvers");
@@ -78,10 +81,7 @@ fn a_figure_of_eight_has_a_fastest_line() {
 #[test]
 fn the_fastest_line_through_chicanes_is_settled() {
     let folder = tempfile::tempdir().expect("a folder");
-    let circuit = Circuit::ten()
-        .into_iter()
-        .find(|circuit| circuit.name == "chicanes");
-    let settings = settings(&circuit.expect("chicanes"), folder.path());
+    let settings = settings(&made_circuit("chicanes"), folder.path());
     let setup = set_up(&settings).expect("a circuit");
     let solvers = setup.solvers(&settings, &Arc::default()).expect("solvers");
     let best = solvers.best(LineObjective::LapTime).expect("a line");
@@ -99,8 +99,7 @@ fn the_fastest_line_through_chicanes_is_settled() {
 #[test]
 fn short_laps_do_not_depend_on_how_closely_they_are_cut() {
     let folder = tempfile::tempdir().expect("a folder");
-    let circuit = Circuit::ten().into_iter().find(|circuit| circuit.name == "kart");
-    let settings = settings(&circuit.expect("a kart circuit"), folder.path());
+    let settings = settings(&made_circuit("kart"), folder.path());
     let times_s = [480, 960].map(|sections| {
         let settings = RacelineSettings {
             sections: Some(sections),
@@ -124,10 +123,7 @@ fn short_laps_do_not_depend_on_how_closely_they_are_cut() {
 #[test]
 fn small_roads_are_solved_as_large_ones() {
     let folder = tempfile::tempdir().expect("a folder");
-    let circuit = Circuit::ten()
-        .into_iter()
-        .find(|circuit| circuit.name == "hairpins");
-    let csv = circuit.expect("hairpins").csv();
+    let csv = made_circuit("hairpins").csv();
     let (head, rows) = csv.split_once('\n').expect("a header");
     let time_s = |scale: f64| {
         let mut scaled = format!("{head}\n");
