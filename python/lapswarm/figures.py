@@ -615,6 +615,7 @@ class RunFigures(Figures):
     car: str
     total_parameter_error: float | None
     rms_error: dict[str, float]
+    told_at_mps: Pair
     ay_mps2: Pair
     ay_in_the_log_mps2: tuple[float | None, float | None]
     top_speed_mps: float

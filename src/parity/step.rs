@@ -171,7 +171,11 @@ impl LaneWork for InLanes<'_> {
     fn run<L: Lanes>(self) -> Self::Output {
         let mut all = Vec::new();
         for pack in self.1.chunks(L::LANES) {
-            let at = |i: usize| L::from_fn(|lane| pack[lane.min(pack.len() - 1)][i]);
+            // Gathered before: in the car's code every gathering would be written out anew.
+            let row: Vec<L> = (0..pack[0].len())
+                .map(|i| L::from_fn(|lane| pack[lane.min(pack.len() - 1)][i]))
+                .collect();
+            let at = |i: usize| row[i];
             let lanes = match self.0 {
                 TyreModel::MagicFormula => outputs::<L, MagicFormula<L>>(at),
                 TyreModel::Linear => outputs::<L, LinearTyre<L>>(at),

@@ -3,6 +3,16 @@
 use super::lanes::Portable;
 use super::{Dual, Real};
 
+/// A part of a kernel. Implementations are `#[inline(always)]`, so that they are compiled for the instruction set of the function that
+/// they stand in.
+pub trait Part {
+    /// What it yields.
+    type Output;
+
+    /// Does it.
+    fn run(self) -> Self::Output;
+}
+
 /// A scalar, or a pack of them, that can be the argument of a table of rows.
 pub trait Lookup: Real {
     /// Where a row starts in its table, one place per lane.
@@ -27,6 +37,13 @@ pub trait Lookup: Real {
 
     /// Whether the mask holds in every lane.
     fn all(mask: Self::Mask) -> bool;
+
+    /// Does a part of a kernel in a function of its own, which has the instruction set of the scalar. All else of a kernel becomes one
+    /// function, and the time that a compiler takes grows faster than a function's length.
+    #[inline(never)]
+    fn apart<P: Part>(part: P) -> P::Output {
+        part.run()
+    }
 }
 
 macro_rules! lone_lookup {
@@ -205,7 +222,7 @@ mod x86 {
 
     macro_rules! wide_lookup {
         (
-            $name:ident, $index:ty, all $all:literal, truncate $truncate:ident, float $float:ident, set1 $set1:ident,
+            $name:ident, $set:literal, $index:ty, all $all:literal, truncate $truncate:ident, float $float:ident, set1 $set1:ident,
             min $min:ident, mul $mul:ident, add $add:ident, gather $gather:expr, rows $rows:ident
         ) => {
             impl Lookup for $name {
@@ -261,17 +278,27 @@ mod x86 {
                 fn all(mask: Self::Mask) -> bool {
                     Self::mask_bits(mask) == $all
                 }
+                #[inline(always)]
+                fn apart<P: Part>(part: P) -> P::Output {
+                    #[inline(never)]
+                    #[target_feature(enable = $set)]
+                    fn alone<P: Part>(part: P) -> P::Output {
+                        part.run()
+                    }
+                    // SAFETY: the set is there.
+                    unsafe { alone(part) }
+                }
             }
         };
     }
     wide_lookup!(
-        Avx512, __m512i, all 0xffff, truncate _mm512_cvttps_epi32, float _mm512_cvtepi32_ps, set1 _mm512_set1_epi32,
+        Avx512, "avx512f,avx512dq", __m512i, all 0xffff, truncate _mm512_cvttps_epi32, float _mm512_cvtepi32_ps, set1 _mm512_set1_epi32,
         min _mm512_min_epu32, mul _mm512_mullo_epi32, add _mm512_add_epi32,
         gather |at, index| _mm512_i32gather_ps::<4>(index, at),
         rows rows_512
     );
     wide_lookup!(
-        Avx2, __m256i, all 0xff, truncate _mm256_cvttps_epi32, float _mm256_cvtepi32_ps, set1 _mm256_set1_epi32,
+        Avx2, "avx2", __m256i, all 0xff, truncate _mm256_cvttps_epi32, float _mm256_cvtepi32_ps, set1 _mm256_set1_epi32,
         min _mm256_min_epu32, mul _mm256_mullo_epi32, add _mm256_add_epi32,
         gather |at, index| _mm256_i32gather_ps::<4>(at, index),
         rows rows_256

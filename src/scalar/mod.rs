@@ -17,7 +17,7 @@ mod pair;
 pub use bisection::{bisected, try_bisected};
 pub use counted::{Counted, operations_of};
 pub use dual::Dual;
-pub use lookup::Lookup;
+pub use lookup::{Lookup, Part};
 pub use pair::Pair;
 
 use std::fmt::Debug;

@@ -129,7 +129,7 @@ fn json_stands_alone_on_standard_output() {
     }
 }
 
-/// A line is driven on the circuit of the run that found it, and on no other by itself.
+/// A line is driven on the circuit of the run that found it, by a car as wide as that run's, and on no other by itself.
 #[test]
 fn a_line_is_driven_on_its_own_circuit() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -150,6 +150,17 @@ fn a_line_is_driven_on_its_own_circuit() {
     let found = planned(&[]);
     assert!(found.status.success(), "{}", said(&found));
     assert!(said(&found).contains(AROUND_RING[1]), "{}", said(&found));
+    // The road is 10 m wide.
+    let wide = RacelineSettings {
+        car_width_m: 10.0,
+        ..settings
+    };
+    std::fs::write(folder.path().join("run/study.toml"), wide.to_toml()).expect("room");
+    let refused = planned(&[]);
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("thecar's10.00m"), "{}", said(&refused));
+    let narrower = planned(&["--car-width-m", "2"]);
+    assert!(narrower.status.success(), "{}", said(&narrower));
     // Of two circuits neither is the one.
     std::fs::create_dir(folder.path().join("other")).expect("a folder");
     std::fs::write(folder.path().join("other/line.csv"), ring()).expect("a line");

@@ -118,12 +118,7 @@ pub fn driven_energy(car: &EnergyCar, plan: &MotorPlan, moments: &[DrivenMoment]
         strategy: &figures,
         drs: &[],
     };
-    let mut state = State {
-        speed_squared: 0.0,
-        change: 0.0,
-        deployed: 0.0,
-        harvested_k: 0.0,
-    };
+    let mut state = State::at(0.0);
     let rolling = car.car.rolling_mps2();
     let mut driven = DrivenLapEnergy::default();
     let lap = &mut driven.lap;

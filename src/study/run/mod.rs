@@ -40,7 +40,7 @@ pub struct Run;
 /// Change of the grip's share from one line to the next below which another line would be the same.
 const SETTLED: f64 = 0.015;
 
-/// Speeds for which the story tells the car's limits, m/s.
+/// Speeds for which the story tells the car's limits (m/s); its top speed instead of one that is beyond it.
 const SPEEDS_TOLD_MPS: [f64; 2] = [25.0, 65.0];
 
 /// What a run begins with: all that it reads, and could refuse.
@@ -294,7 +294,7 @@ fn run_stages(
             line: vec![line_path.clone()],
             track: Some(line.track.clone()),
             car: car_path.clone(),
-            car_width_m: settings.raceline.car_width_m,
+            car_width_m: Some(settings.raceline.car_width_m),
             steering_rate_deg_s: settings.raceline.steering_rate_deg_s,
             ..TransientSettings::default()
         };
@@ -364,6 +364,7 @@ fn run_stages(
     let mut record = fitted.record.clone();
     record.elapsed_s = watch.elapsed_s();
     record.longest_dispatch_ms = watch.longest_dispatch_ms();
+    let told_at_mps = SPEEDS_TOLD_MPS.map(|v| v.min(whole.top_speed_mps()));
     Ok(Summary {
         study: Run::NAME.to_owned(),
         seed: settings.identify.seed,
@@ -372,8 +373,9 @@ fn run_stages(
         car: car.name.clone(),
         total_parameter_error: fitted.total_parameter_error,
         rms_error: fitted.rms_error,
-        ay_mps2: SPEEDS_TOLD_MPS.map(|v| whole.at(v).ay_mps2),
-        ay_in_the_log_mps2: SPEEDS_TOLD_MPS.map(|v| Some(car.reached.as_ref()?.at(v)?.ay_mps2)),
+        told_at_mps,
+        ay_mps2: told_at_mps.map(|v| whole.at(v).ay_mps2),
+        ay_in_the_log_mps2: told_at_mps.map(|v| Some(car.reached.as_ref()?.at(v)?.ay_mps2)),
         top_speed_mps: whole.top_speed_mps(),
         agrees: rounds.last().is_some_and(RoundSummary::agrees),
         rounds,

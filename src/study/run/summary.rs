@@ -114,7 +114,10 @@ pub struct Summary {
     pub total_parameter_error: Option<f64>,
     /// Root mean square errors of the identified car, as its summary has them.
     pub rms_error: BTreeMap<String, f64>,
-    /// Lateral acceleration that the car can hold at 25 and at 65 m/s (m/s^2).
+    /// Speeds for which the limits are told: 25 and 65 m/s, or the top speed (m/s).
+    #[serde(default = "speeds_told")]
+    pub told_at_mps: [f64; 2],
+    /// Lateral acceleration that the car can hold at these speeds (m/s^2).
     pub ay_mps2: [f64; 2],
     /// What the log reached about these speeds (m/s^2), where it came to them: limits beyond it are extrapolated.
     #[serde(default)]
@@ -129,6 +132,11 @@ pub struct Summary {
     pub agrees: bool,
     /// Stages that were taken from earlier runs.
     pub reused: Vec<String>,
+}
+
+/// The speeds of summaries that do not say.
+fn speeds_told() -> [f64; 2] {
+    super::SPEEDS_TOLD_MPS
 }
 
 impl Summary {
@@ -146,8 +154,8 @@ impl Summary {
             text += &format!("; its parameters are off the truth by {error:.1e} in all");
         }
         text += &format!(
-            ".\nIts limits {:.1} m/s^2 across at 25 m/s, {:.1} at 65; {:.1} m/s at most.\n",
-            self.ay_mps2[0], self.ay_mps2[1], self.top_speed_mps
+            ".\nIts limits {:.1} m/s^2 across at {:.0} m/s, {:.1} at {:.0}; {:.1} m/s at most.\n",
+            self.ay_mps2[0], self.told_at_mps[0], self.ay_mps2[1], self.told_at_mps[1], self.top_speed_mps
         );
         let beyond = [0, 1].map(|k| !Reached::supports(self.ay_in_the_log_mps2[k], self.ay_mps2[k]));
         if beyond.contains(&true) {

@@ -258,10 +258,11 @@ fn read(settings: &TransientSettings) -> Result<Prepared> {
         .iter()
         .map(|file| read_line(file))
         .collect::<Result<Vec<_>>>()?;
-    let road = raceline::set_up(&settings.raceline()?)?;
+    let of_road = settings.raceline()?;
+    let road = raceline::set_up(&of_road)?;
     let named = names_of(files).into_iter().zip(points);
     let lines = named
-        .map(|(name, points)| NamedLine::new(name, points, &road, settings.car_width_m))
+        .map(|(name, points)| NamedLine::new(name, points, &road, of_road.car_width_m))
         .collect::<Result<Vec<_>>>()?;
     let motor = Motor::read(settings, &car, &road.car, &lines)?;
     Ok(Prepared {

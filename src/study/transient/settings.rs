@@ -5,7 +5,7 @@ use crate::config::kinds::{
     Kind, NameOrFile, choice, count, file, files, name_or_file, number, numbers, optional, text, texts,
 };
 use crate::config::settings::settings;
-use crate::config::{Document, folder_of, read_text};
+use crate::config::{Document, Table, folder_of, read_text};
 use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::files::run_folder::SETTINGS;
@@ -14,7 +14,7 @@ use crate::study::framework::memory::{ANSWER, MemoryItem};
 use crate::study::framework::setups::{FreeParameter, MOST_SETUPS, check_parameters, free_parameters};
 use crate::study::raceline::RacelineSettings;
 use crate::vehicle::Car;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 settings! {
     /// Settings of a drive.
@@ -27,8 +27,8 @@ settings! {
             "The car: a bundled name (gt) or a TOML file";
         envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
             "The g-g-v envelope from a table instead of the car's own";
-        car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
-            "Width of the car, all of which stays within the edges";
+        car_width_m: Option<f64> ["m"] = None, optional(number(0.0, 10.0)).example("1.3"),
+            "Width of the car, all of which stays within the edges; without it that of the run in whose folder the line lies, else 2 m";
         steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
             "Fastest turn of the front wheels; without it the car's own";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
@@ -155,10 +155,36 @@ impl TransientSettings {
             },
             car: self.car.clone(),
             envelope: self.envelope.clone(),
-            car_width_m: self.car_width_m,
+            car_width_m: self.width_m()?,
             steering_rate_deg_s: self.steering_rate_deg_s,
             ..RacelineSettings::default()
         })
+    }
+
+    /// The width of the car (m): where it is not given, the greatest of those that the lines were found for.
+    fn width_m(&self) -> Result<f64> {
+        if let Some(width_m) = self.car_width_m {
+            return Ok(width_m);
+        }
+        let widths = self.of_runs(|table, _| table.number("car_width_m", 0.0, 10.0, "m"))?;
+        let unsaid = RacelineSettings::default().car_width_m;
+        let known = widths.into_iter().map(|width| width.unwrap_or(unsaid));
+        Ok(known.reduce(f64::max).unwrap_or(unsaid))
+    }
+
+    /// A setting of the runs that found the lines, line by line; nothing where none lies beside a line, or does not say.
+    fn of_runs<T>(&self, read: impl Fn(&Table<'_>, &Path) -> Result<Option<T>>) -> Result<Vec<Option<T>>> {
+        let of_run = |line: &PathBuf| {
+            let folder = folder_of(line);
+            let study = folder.join(SETTINGS);
+            if !study.is_file() {
+                return Ok(None);
+            }
+            let text = read_text(&study)?;
+            let document = Document::parse(&study, &text)?;
+            read(&document.root(), folder)
+        };
+        self.line.iter().map(of_run).collect()
     }
 
     /// The circuit of the runs that found the lines, by the settings beside them.
@@ -166,17 +192,9 @@ impl TransientSettings {
     /// # Errors
     /// [`Error::Input`] where a line has none, or two have different ones.
     fn track_of_lines(&self) -> Result<String> {
+        let found = self.of_runs(|table, folder| NameOrFile.read(table, "track", "-", folder))?;
         let mut tracks = Vec::new();
-        for line in &self.line {
-            let folder = folder_of(line);
-            let study = folder.join(SETTINGS);
-            let track = if study.is_file() {
-                let text = read_text(&study)?;
-                let document = Document::parse(&study, &text)?;
-                NameOrFile.read(&document.root(), "track", "-", folder)?
-            } else {
-                None
-            };
+        for (line, track) in self.line.iter().zip(found) {
             tracks.push(track.ok_or_else(|| {
                 let found = format!("none, and no run beside {} that tells of one", line.display());
                 Error::input("the study", "track", found, "the circuit that the lines are on")
