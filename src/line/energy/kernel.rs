@@ -525,7 +525,7 @@ pub fn motors_step<G: Ground<f64>>(
 /// Fills `speeds` with the greatest speeds squared from which all that follows can be braked for.
 struct Ceilings<'a, R: Real, G> {
     envelope: &'a EnvelopeTable<R::Storage>,
-    begin: (bool, usize, R),
+    begin: Begin<R>,
     course: &'a Course<R>,
     speeds: &'a mut Vec<R>,
     road: PhantomData<G>,
@@ -626,6 +626,9 @@ pub fn energy_lap<R: Lookup>(
 /// What a lap reads: envelope, energy and zones.
 type Tables<'a, S> = (&'a EnvelopeTable<S>, &'a EnergyTable<S>, &'a EnergyPlan<S>);
 
+/// Whether the line is closed, the section where the braking pass begins, and the greatest speed squared at the start of an open line.
+type Begin<R> = (bool, usize, R);
+
 /// The section after `here` on a lap of `n`.
 #[inline(always)]
 fn after(n: usize, here: usize) -> usize {
@@ -699,7 +702,7 @@ impl<R: Lookup, G: Grounds<R>> Part for FirstDrive<'_, R, G> {
 /// [`energy_lap`] on one kind of road.
 struct Lap<'a, R: Real, G, F> {
     tables: Tables<'a, R::Storage>,
-    begin: (bool, usize, R),
+    begin: Begin<R>,
     strategy: &'a [R],
     course: &'a mut Course<R>,
     record: F,
