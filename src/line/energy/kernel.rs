@@ -1,11 +1,7 @@
-//! The energy kernel: a lap on a line's lengths and curvatures with engine, motor-generators and store.
-//! Twin of `shaders/energy.wgsl`.
+//! The energy kernel: a segment of a line with engine, motor-generators and store. `lap.rs` goes through them.
+//! Twin of `shaders/energy.wgsl`, with that file.
 //!
-//! Braking comes first. A backward pass from the corner speeds gives the greatest speed at every section from which the car can
-//! still brake for all that follows. The lap itself is a forward pass below these speeds. It goes from section to section, so it
-//! knows the charge of the store and the energy used so far, on which the gates of the motor depend. Energies are counted from
-//! the start line. The car must cross it at the speed with which it ends the lap, so a closed lap is driven twice: once to find
-//! that speed and once for the accounts. On a road in three dimensions the forces at the wheels also lift the car.
+//! On a road in three dimensions the forces at the wheels also lift the car.
 //!
 //! The MGU-H is a machine on the turbocharger's shaft: what it generates costs power at the crank. At part load the engine burns
 //! for it by its map. At full load the engine cannot give more, and the car is slower for it. Where the motor replaces the engine,
@@ -13,18 +9,15 @@
 //! compressor where the motor works beside the engine: the engine then gives more, and the store pays for it, at a price of its own.
 //!
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
-//! Engineering 2013, for the energies that are accounted; the passes are those of [`super::super::kernel`].
+//! Engineering 2013, for the energies that are accounted.
 
-use super::super::ground::{Ground, Grounds, LevelRoad, SlopedRoad};
-use super::super::kernel::{
-    BLOCK, Course, braked, corner, driving_with_drs, look_up, may_open, steered_corner,
-};
+use super::super::ground::Ground;
+use super::super::kernel::{driving_with_drs, look_up, may_open};
 use super::super::point_mass::EnvelopeTable;
-use super::figures::{EnergyLap, SegmentEnergy};
+use super::figures::SegmentEnergy;
 use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
 use super::table::EnergyTable;
-use crate::scalar::{Lookup, Part, Real};
-use std::marker::PhantomData;
+use crate::scalar::{Lookup, Real};
 
 /// The part of a lap that later segments depend on.
 #[derive(Clone, Copy)]
@@ -80,19 +73,19 @@ pub(super) struct Along<R> {
 }
 
 /// A step along a segment.
-struct Step<R> {
+pub(super) struct Step<R> {
     /// Speed squared at the end.
-    end: R,
+    pub(super) end: R,
     /// What the motor, and the MGU-H as one, add to the acceleration (m/s^2).
-    motor: R,
+    pub(super) motor: R,
     /// The part of the MGU-H (m/s^2).
     assist: R,
     /// What gates and zone allow the MGU-K (m/s^2),
-    wanted: R,
+    pub(super) wanted: R,
     /// and that for which the store has energy.
-    boost: R,
+    pub(super) boost: R,
     /// What the store took yet (J): with room in it the MGU-H lowered the engine's part.
-    space: R,
+    pub(super) space: R,
 }
 
 /// The share of a segment in which its zone allows the motor to work.
@@ -104,7 +97,7 @@ fn zone_share<R: Real>(row: &ZoneRow<R::Storage>, strategy: &[R]) -> R {
 
 /// Where both hold, `x`, else zero.
 #[inline(always)]
-fn gated<R: Real>(mask: R::Mask, x: R) -> R {
+pub(super) fn gated<R: Real>(mask: R::Mask, x: R) -> R {
     R::select(mask, x, R::lit(0.0))
 }
 
@@ -184,7 +177,7 @@ impl<R: Lookup> Car<'_, R> {
     /// greatest speed squared at its end. `store` has the energy that may leave the store and the space that is in it (J): while
     /// there is some, the MGU-H lowers what an engine at full load gives.
     #[inline(always)]
-    fn additional<G: Ground<R>>(
+    pub(super) fn additional<G: Ground<R>>(
         &self,
         here: usize,
         from: R,
@@ -291,7 +284,14 @@ impl<R: Lookup> Car<'_, R> {
 
     /// Drives along a segment by the engine alone.
     #[inline(always)]
-    fn engine_only<G: Ground<R>>(&self, here: usize, from: R, length: R, bends: [G; 2], most: R) -> R {
+    pub(super) fn engine_only<G: Ground<R>>(
+        &self,
+        here: usize,
+        from: R,
+        length: R,
+        bends: [G; 2],
+        most: R,
+    ) -> R {
         let zero = R::lit(0.0);
         let [traction, drive, drag, _] = self.driving_at(here, from, bends[0]);
         let first = bends[0].uphill(traction.min(drive) - drag);
@@ -305,7 +305,7 @@ impl<R: Lookup> Car<'_, R> {
     /// One segment of the lap that only finds the speed at the start line, with the motor beside the engine: what is deployed,
     /// and what the MGU-K harvests where the charge matters. The small charge by the MGU-H is left out here.
     #[inline(always)]
-    fn provisional<G: Ground<R>>(
+    pub(super) fn provisional<G: Ground<R>>(
         &self,
         state: &mut State<R>,
         here: usize,
@@ -349,7 +349,7 @@ impl<R: Lookup> Car<'_, R> {
     /// One segment with its accounts, up to the greatest speed squared at its end. `first` has the results of the first drive for
     /// this segment and the speed squared with which that drive entered it.
     #[inline(always)]
-    fn segment<G: Ground<R>>(
+    pub(super) fn segment<G: Ground<R>>(
         &self,
         state: &mut State<R>,
         root: &mut R,
@@ -520,288 +520,4 @@ pub fn motors_step<G: Ground<f64>>(
         table.rotating * step.motor,
         table.rotating * step.assist,
     ]
-}
-
-/// Fills `speeds` with the greatest speeds squared from which all that follows can be braked for.
-struct Ceilings<'a, R: Real, G> {
-    envelope: &'a EnvelopeTable<R::Storage>,
-    begin: Begin<R>,
-    course: &'a Course<R>,
-    speeds: &'a mut Vec<R>,
-    road: PhantomData<G>,
-}
-
-impl<R: Lookup, G: Grounds<R>> Part for Ceilings<'_, R, G> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self {
-            envelope,
-            begin: (closed, start, entry),
-            course,
-            speeds,
-            ..
-        } = self;
-        let n = course.curvature.len();
-        speeds.clear();
-        speeds.resize(n, R::lit(0.0));
-        let previous = |section: usize| if section > 0 { section - 1 } else { n - 1 };
-        let mut next = if closed { start } else { n - 1 };
-        let mut here = previous(next);
-        let [from, to] = [here, next].map(|section| G::at(course, section, section));
-        speeds[next] = steered_corner(envelope, course.length[here], from, to);
-        // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
-        // own values.
-        let steps = if closed { 2 * n } else { n - 1 };
-        for step in 0..steps {
-            let before = previous(here);
-            let reached = braked(
-                envelope,
-                speeds[next],
-                course.length[here],
-                G::at(course, next, here),
-                G::at(course, here, here),
-            );
-            let again = step + 1 >= n;
-            let most = if again {
-                speeds[here]
-            } else if !closed && here == 0 {
-                corner(envelope, G::at(course, here, here))
-            } else {
-                let [from, to] = [before, here].map(|section| G::at(course, section, section));
-                steered_corner(envelope, course.length[before], from, to)
-            };
-            let slower = reached.less_than(most);
-            speeds[here] = R::select(slower, reached, most);
-            if again && R::all(!slower) {
-                break;
-            }
-            (next, here) = (here, before);
-        }
-        if !closed {
-            speeds[0] = speeds[0].min(entry);
-        }
-    }
-}
-
-/// A lap with energy on `course`, whose lengths, curvatures and relief are given; afterwards its speeds squared are those from which the
-/// car can still brake. `start` is the section where the braking pass begins, as in [`super::super::kernel::lap_time`]; `entry`
-/// is the greatest speed squared at the start of an open line. `strategy` has the figures of the gates, then the share of each
-/// zone. `record` receives every segment of the lap that is accounted.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub fn energy_lap<R: Lookup>(
-    envelope: &EnvelopeTable<R::Storage>,
-    table: &EnergyTable<R::Storage>,
-    plan: &EnergyPlan<R::Storage>,
-    (closed, start, entry): (bool, usize, R),
-    strategy: &[R],
-    course: &mut Course<R>,
-    record: impl FnMut(usize, &SegmentEnergy<R>),
-) -> EnergyLap<R> {
-    let tables = (envelope, table, plan);
-    let begin = (closed, start, entry);
-    if course.relief.is_empty() {
-        R::apart(Lap::<_, LevelRoad, _> {
-            tables,
-            begin,
-            strategy,
-            course,
-            record,
-            road: PhantomData,
-        })
-    } else {
-        R::apart(Lap::<_, SlopedRoad, _> {
-            tables,
-            begin,
-            strategy,
-            course,
-            record,
-            road: PhantomData,
-        })
-    }
-}
-
-/// What a lap reads: envelope, energy and zones.
-type Tables<'a, S> = (&'a EnvelopeTable<S>, &'a EnergyTable<S>, &'a EnergyPlan<S>);
-
-/// Whether the line is closed, the section where the braking pass begins, and the greatest speed squared at the start of an open line.
-type Begin<R> = (bool, usize, R);
-
-/// The section after `here` on a lap of `n`.
-#[inline(always)]
-fn after(n: usize, here: usize) -> usize {
-    if here + 1 < n { here + 1 } else { 0 }
-}
-
-/// The ground at both ends of a segment.
-#[inline(always)]
-fn bends<R: Lookup, G: Grounds<R>>(course: &Course<R>, here: usize) -> [G::Place; 2] {
-    let there = after(course.curvature.len(), here);
-    [G::at(course, here, here), G::at(course, there, here)]
-}
-
-/// The drive of a closed lap that finds the speed at the start line, with which it begins and ends.
-struct FirstDrive<'a, R: Real, G> {
-    car: &'a Car<'a, R>,
-    course: &'a Course<R>,
-    /// The greatest speeds squared.
-    most: &'a [R],
-    /// Filled with the results of the drive for each segment, with motors beside the engine.
-    drive: &'a mut Vec<[R; 5]>,
-    road: PhantomData<G>,
-}
-
-impl<R: Lookup, G: Grounds<R>> Part for FirstDrive<'_, R, G> {
-    /// Speeds squared at the line: where the lap begins, and where this drive began.
-    type Output = [R; 2];
-
-    #[inline(always)]
-    fn run(self) -> [R; 2] {
-        let Self {
-            car, course, most, ..
-        } = self;
-        let n = course.curvature.len();
-        // From a slow section late in the lap to the start line, with the store taken as full enough.
-        let mut speed_squared = most[car.plan.run_in];
-        for here in car.plan.run_in..n {
-            let (h, bend, held) = (
-                course.length[here],
-                bends::<R, G>(course, here),
-                most[after(n, here)],
-            );
-            speed_squared = match car.plan.mode {
-                Mode::Additional => {
-                    let enough = car.strategy[4];
-                    let space = R::load(car.table.store_room) + enough;
-                    car.additional(here, speed_squared, h, bend, held, [enough, space])
-                        .end
-                }
-                Mode::Offset => car.engine_only(here, speed_squared, h, bend, held),
-            };
-        }
-        if car.plan.mode == Mode::Offset {
-            return [speed_squared, R::lit(0.0)];
-        }
-        let mut state = State::at(speed_squared);
-        for here in 0..n {
-            let (h, bend, held) = (
-                course.length[here],
-                bends::<R, G>(course, here),
-                most[after(n, here)],
-            );
-            let step = car.provisional(&mut state, here, h, bend, held);
-            self.drive
-                .push([step.end, step.motor, step.wanted, step.boost, step.space]);
-        }
-        [state.speed_squared, speed_squared]
-    }
-}
-
-/// [`energy_lap`] on one kind of road.
-struct Lap<'a, R: Real, G, F> {
-    tables: Tables<'a, R::Storage>,
-    begin: Begin<R>,
-    strategy: &'a [R],
-    course: &'a mut Course<R>,
-    record: F,
-    road: PhantomData<G>,
-}
-
-impl<R: Lookup, G: Grounds<R>, F: FnMut(usize, &SegmentEnergy<R>)> Part for Lap<'_, R, G, F> {
-    type Output = EnergyLap<R>;
-
-    #[inline(always)]
-    fn run(self) -> EnergyLap<R> {
-        let Self {
-            tables: (envelope, table, plan),
-            begin,
-            strategy,
-            course,
-            mut record,
-            road,
-        } = self;
-        let mut most = std::mem::take(&mut course.speed_squared);
-        R::apart(Ceilings::<R, G> {
-            envelope,
-            begin,
-            course,
-            speeds: &mut most,
-            road,
-        });
-        let n = course.curvature.len();
-        let zero = R::lit(0.0);
-        let mut first_drive = std::mem::take(&mut course.first_drive);
-        first_drive.clear();
-        let car = Car {
-            envelope,
-            table,
-            plan,
-            strategy,
-            drs: &course.drs,
-        };
-        let (closed, ..) = begin;
-        let [speed_squared, mut first_speed_squared] = if closed {
-            R::apart(FirstDrive::<R, G> {
-                car: &car,
-                course,
-                most: &most,
-                drive: &mut first_drive,
-                road,
-            })
-        } else {
-            [most[0], zero]
-        };
-
-        let mut state = State::at(speed_squared);
-        let mut root = speed_squared.sqrt();
-        let (mut greatest, mut least) = (zero, zero);
-        let mut total = [zero; 6];
-        let mut block = [zero; 6];
-        let segments = if closed { n } else { n - 1 };
-        for here in 0..segments {
-            let first = first_drive.get(here).copied();
-            let along = (
-                course.length[here],
-                bends::<R, G>(course, here),
-                most[after(n, here)],
-            );
-            let s = car.segment(&mut state, &mut root, here, along, (first, first_speed_squared));
-            first_speed_squared = first.map_or(zero, |[end, ..]| end);
-            record(here, &s);
-            let motor_time = gated(zero.less_than(s.deployed), s.time);
-            let terms = [
-                s.time,
-                s.fuel,
-                s.deployed,
-                s.harvested_k,
-                s.harvested_h,
-                motor_time,
-            ];
-            for (block, term) in block.iter_mut().zip(terms) {
-                *block = *block + term;
-            }
-            greatest = greatest.max(state.change);
-            least = least.min(state.change);
-            if (here + 1) % BLOCK == 0 || here + 1 == segments {
-                for (total, block) in total.iter_mut().zip(&mut block) {
-                    *total = *total + *block;
-                    *block = zero;
-                }
-            }
-        }
-        (course.speed_squared, course.first_drive) = (most, first_drive);
-        let [time, fuel, deployed, harvested_k, harvested_h, motor_time] = total;
-        EnergyLap {
-            time,
-            fuel,
-            deployed,
-            harvested_k,
-            harvested_h,
-            change: state.change,
-            swing: greatest - least,
-            motor_time,
-        }
-    }
 }

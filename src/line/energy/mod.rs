@@ -6,6 +6,7 @@ mod figures;
 #[cfg(test)]
 mod hill_tests;
 pub mod kernel;
+mod lap;
 mod plan;
 mod table;
 #[cfg(test)]
@@ -15,7 +16,7 @@ mod zones;
 pub use car::EnergyCar;
 pub use driven::{DrivenLapEnergy, DrivenMoment, MotorPlan, driven_energy};
 pub use figures::{EnergyLap, FIGURES, SegmentEnergy};
-pub use kernel::energy_lap;
+pub use lap::energy_lap;
 pub use plan::{EnergyPlan, GATES, Gates, Mode, ZoneRow};
 pub use table::{EnergyTable, hybrid_parts};
 pub use zones::{GAP_M, late_bend, zone_starts};
