@@ -150,17 +150,26 @@ fn a_line_is_driven_on_its_own_circuit() {
     let found = planned(&[]);
     assert!(found.status.success(), "{}", said(&found));
     assert!(said(&found).contains(AROUND_RING[1]), "{}", said(&found));
-    // The road is 10 m wide.
-    let wide = RacelineSettings {
-        car_width_m: 10.0,
-        ..settings
-    };
-    std::fs::write(folder.path().join("run/study.toml"), wide.to_toml()).expect("room");
-    let refused = planned(&[]);
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
-    assert!(said(&refused).contains("thecar's10.00m"), "{}", said(&refused));
-    let narrower = planned(&["--car-width-m", "2"]);
-    assert!(narrower.status.success(), "{}", said(&narrower));
+    // A road of 1.5 m has a line for a car of 1.3 m. A line for a car that is declared 3 m wide has room for one of 2 m.
+    for (track, car_width_m, [fits, wide]) in [
+        ("circle:99.25:100.75", 1.3, ["1.4", "2"]),
+        ("circle:98.75:101.25", 3.0, ["2.4", "3"]),
+    ] {
+        let of_run = RacelineSettings {
+            track: track.to_owned(),
+            car_width_m,
+            ..settings.clone()
+        };
+        std::fs::write(folder.path().join("run/study.toml"), of_run.to_toml()).expect("room");
+        for more in [&[][..], &["--car-width-m", fits]] {
+            let driven = planned(more);
+            assert!(driven.status.success(), "{car_width_m}: {}", said(&driven));
+        }
+        let refused = planned(&["--car-width-m", wide]);
+        assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+        assert!(said(&refused).contains("thecar's"), "{}", said(&refused));
+    }
+    std::fs::write(folder.path().join("run/study.toml"), settings.to_toml()).expect("room");
     // Of two circuits neither is the one.
     std::fs::create_dir(folder.path().join("other")).expect("a folder");
     std::fs::write(folder.path().join("other/line.csv"), ring()).expect("a line");

@@ -28,7 +28,7 @@ settings! {
         envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
             "The g-g-v envelope from a table instead of the car's own";
         car_width_m: Option<f64> ["m"] = None, optional(number(0.0, 10.0)).example("1.3"),
-            "Width of the car, all of which stays within the edges; without it that of the run in whose folder the line lies, else 2 m";
+            "Width of the car, all of which stays within the edges; without it that of the run in whose folder the line lies, 2 m at the most";
         steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
             "Fastest turn of the front wheels; without it the car's own";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
@@ -161,7 +161,8 @@ impl TransientSettings {
         })
     }
 
-    /// The width of the car (m): where it is not given, the greatest of those that the lines were found for.
+    /// The width of the car (m): where it is not given, the greatest of those that the lines were found for. A line that was found for
+    /// more than the usual width is one with room for the driver.
     fn width_m(&self) -> Result<f64> {
         if let Some(width_m) = self.car_width_m {
             return Ok(width_m);
@@ -169,7 +170,7 @@ impl TransientSettings {
         let widths = self.of_runs(|table, _| table.number("car_width_m", 0.0, 10.0, "m"))?;
         let unsaid = RacelineSettings::default().car_width_m;
         let known = widths.into_iter().map(|width| width.unwrap_or(unsaid));
-        Ok(known.reduce(f64::max).unwrap_or(unsaid))
+        Ok(known.reduce(f64::max).map_or(unsaid, |width| width.min(unsaid)))
     }
 
     /// A setting of the runs that found the lines, line by line; nothing where none lies beside a line, or does not say.
