@@ -9,8 +9,22 @@ use crate::error::{Error, Place, Result};
 use crate::track::Surface;
 use glam::DVec2;
 
-/// Distance between the points of the fine spline that lines are reported on (m).
-pub const FINE_M: f64 = 1.0;
+/// Distance between the points of the fine spline that lines are reported on (m), on laps of [`WHOLE_M`] or more.
+const FINE_M: f64 = 1.0;
+/// Length of a lap (m) below which distances shrink with it, and the least share of them. The bends of shorter laps, as those of karts
+/// and of Formula Student, are tighter in proportion.
+const WHOLE_M: f64 = 3000.0;
+const SMALLEST: f64 = 0.1;
+
+/// By what share distances that suit a long lap are smaller on one of `length_m` (m).
+pub fn scale_of(length_m: f64) -> f64 {
+    (length_m / WHOLE_M).clamp(SMALLEST, 1.0)
+}
+
+/// Distance between the points of the fine spline that lines of a road of `length_m` are reported on (m).
+pub fn fine_m(length_m: f64) -> f64 {
+    FINE_M * scale_of(length_m)
+}
 
 /// A line on a fine grid, which shows oscillations between coarse points.
 #[derive(Clone, Debug, PartialEq)]

@@ -27,7 +27,7 @@ mod table;
 mod tests;
 
 pub use check::{CarPlan, Clearance, ON_ROAD_M, RoadEdges, check_line};
-pub use fine::{FINE_M, FineLine};
+pub use fine::{FineLine, fine_m, scale_of};
 pub use geometry::{Geometry, geometry};
 pub use kernel::{BySection, Within};
 pub use loads::LoadTables;

@@ -8,7 +8,7 @@ use super::{
 use crate::error::Result;
 use crate::evaluate::line::LineObjective;
 use crate::line::{
-    CarPlan, FINE_M, FineLine, ON_ROAD_M, PointMass, RoadEdges, Spread, cross_sections_about, shares_across,
+    CarPlan, FineLine, ON_ROAD_M, PointMass, RoadEdges, Spread, cross_sections_about, fine_m, shares_across,
 };
 use crate::track::CrossSections;
 use glam::DVec2;
@@ -473,7 +473,7 @@ impl ReferenceSolvers {
             &points,
             self.cross_sections.relief_of(&points).as_deref(),
             self.cross_sections.closed,
-            FINE_M,
+            fine_m(self.cross_sections.length_m),
             Some((&self.car, &self.cross_sections.drs)),
             self.entry_mps,
         )?;

@@ -84,7 +84,8 @@ impl Study for Raceline {
     const DETAILS: &'static str = "Examples:\n  lapswarm raceline\n  lapswarm raceline --track my_circuit.csv --car \
         runs/identify-001/car.toml\n  lapswarm raceline --section Abbey --objectives lap_time\n\nLines are looked for through \
         the cross-sections. Where the car leaves the road between them, by a centimetre or more, the line is moved in. Where \
-        that cannot be, there is no best line: the study says where, and ends with exit code 1.";
+        that does not help, it gives way towards the reference line, and a warning says so. Where nothing helps, there is no \
+        best line: the study says where, and ends with exit code 1.";
     type Settings = RacelineSettings;
     type State = LinesState;
     type Prepared = Setup;

@@ -5,7 +5,7 @@ use crate::config::settings::Settings;
 use crate::error::{Error, Result};
 use crate::evaluate::Evaluator;
 use crate::evaluate::line::{CpuLineEvaluator, LineObjective, LineProblem};
-use crate::line::{Clearance, FINE_M, FineLine, Parametrisation, PointMass, RoadEdges, TERMS};
+use crate::line::{Clearance, FineLine, Parametrisation, PointMass, RoadEdges, TERMS, fine_m, scale_of};
 use crate::optimum::{ReferenceSolvers, mended};
 use crate::study::framework::Plan;
 use crate::track::{CrossSections, Track, racetrack_csv};
@@ -16,11 +16,12 @@ use glam::DVec2;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Waves of a survey's reference line that are shorter than this are noise (m): the tightest bend of a road is longer.
+/// Waves of a survey's reference line that are shorter than this are noise (m), on long laps: the tightest bend of a road is longer.
 const REFERENCE_M: f64 = 60.0;
 /// Cross-sections that tell the length of a track.
 const FEW: usize = 960;
-/// Distance between the points of the edges that lines are held within (m): an edge of 10 m radius is straight to a centimetre.
+/// Distance between the points of the edges that lines are held within (m), on long laps: an edge of 10 m radius is straight to a
+/// centimetre.
 const EDGE_M: f64 = 1.0;
 
 /// The track and the car, ready for lines.
@@ -52,15 +53,18 @@ pub fn set_up(settings: &RacelineSettings) -> Result<Setup> {
     let few = track.cross_sections(FEW, settings.as_surveyed)?;
     let sections = settings.sections_on(few.length_m);
     settings.check_sectors_of(sections)?;
+    let scale = scale_of(few.length_m);
     let road = track
         .cross_sections(sections, settings.as_surveyed)?
-        .with_smooth_reference(REFERENCE_M);
+        .with_smooth_reference(scale * REFERENCE_M);
     let cut = |step_m: f64| {
         let close = ((road.length_m / step_m).ceil() as usize).clamp(sections, 1_000_000);
         track.cross_sections(close, settings.as_surveyed)
     };
     // Inside a bend that is hardly wider than its road, cross-sections may be too close to one another to be turned apart.
-    let dense = cut(EDGE_M).or_else(|_| cut(2.0 * EDGE_M))?;
+    let dense = cut(scale * EDGE_M)
+        .or_else(|_| cut(EDGE_M))
+        .or_else(|_| cut(2.0 * EDGE_M))?;
     let close = dense.len();
     let (road, dense) = match &settings.section {
         Some(name) => {
@@ -210,7 +214,8 @@ impl ReportedLine {
 
 /// Shares of the way to the reference line by which a line gives way that bending does not bring onto the road.
 const TOWARDS_REFERENCE: [f64; 6] = [0.0025, 0.005, 0.01, 0.02, 0.04, 0.08];
-/// The same for the line of a swarm alone, which may zigzag from cross-section to cross-section.
+/// The same for the line of a swarm alone, which may zigzag from cross-section to cross-section, and for a line that nothing else brings
+/// onto the road.
 const FAR_TOWARDS_REFERENCE: [f64; 3] = [0.16, 0.32, 0.64];
 
 /// The gear that gives most (from 1) at each speed (m/s), on driven wheels of a radius (m); the top gear beyond the last engine speed.
@@ -324,7 +329,14 @@ impl Setup {
     fn measured(&self, alpha: &[f64], settings: &RacelineSettings) -> Result<(FineLine, Vec<[f64; 2]>)> {
         let cross_sections = &self.cross_sections;
         let points = cross_sections.points(alpha);
-        let fine = FineLine::new(&points, cross_sections.closed, FINE_M, None, settings.entry_mps)?;
+        let spacing_m = fine_m(cross_sections.length_m);
+        let fine = FineLine::new(
+            &points,
+            cross_sections.closed,
+            spacing_m,
+            None,
+            settings.entry_mps,
+        )?;
         let edges = RoadEdges::new(&self.edges_m[0], &self.edges_m[1], cross_sections.closed);
         let clearances = edges.clearances(&fine, &settings.plan_with_margin());
         Ok((fine, clearances))
@@ -355,6 +367,12 @@ impl Setup {
         Ok(given_way.map(|(line, _)| line))
     }
 
+    /// The line that is this share of the way from a line to the reference line.
+    fn towards_reference(&self, alpha: &[f64], share: f64) -> Vec<f64> {
+        let both = alpha.iter().zip(&self.cross_sections.reference);
+        both.map(|(a, r)| a + share * (r - a)).collect()
+    }
+
     /// The line that has given way towards the reference line by the first of the shares that brings it onto the road, and that share.
     fn given_way(
         &self,
@@ -363,11 +381,33 @@ impl Setup {
         settings: &RacelineSettings,
     ) -> Result<Option<(Vec<f64>, f64)>> {
         for share in shares {
-            let both = alpha.iter().zip(&self.cross_sections.reference);
-            let line: Vec<f64> = both.map(|(a, r)| a + share * (r - a)).collect();
+            let line = self.towards_reference(alpha, *share);
             let (fine, clearances) = self.measured(&line, settings)?;
             if Clearance::least(&fine, &clearances).is_on_road() {
                 return Ok(Some((line, *share)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// A line that nothing else has brought onto the road, given way far towards the reference line; nothing where that does not help
+    /// either.
+    ///
+    /// # Errors
+    /// Those of [`Setup::report`].
+    pub fn report_given_way(
+        &self,
+        line: &ReportedLine,
+        settings: &RacelineSettings,
+    ) -> Result<Option<ReportedLine>> {
+        for share in FAR_TOWARDS_REFERENCE {
+            let alpha = self.towards_reference(&line.alpha, share);
+            if let Some(alpha) = self.brought_in(&alpha, settings)? {
+                let line = self.report(&line.name, &alpha, settings)?;
+                return Ok(Some(ReportedLine {
+                    gave_way: Some(share),
+                    ..line
+                }));
             }
         }
         Ok(None)
@@ -401,7 +441,7 @@ impl Setup {
             &points,
             relief.as_deref(),
             closed,
-            FINE_M,
+            fine_m(self.cross_sections.length_m),
             car,
             settings.entry_mps,
         )?;

@@ -96,10 +96,14 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
                         }
                     }
                     if !best.clearance.is_on_road() && !work.interrupted {
-                        return Err(off_road(setup, &best));
+                        let on_road = setup.report_given_way(&best, settings)?;
+                        best = on_road.ok_or_else(|| off_road(setup, &best))?;
                     }
-                    let best = best.alpha;
-                    let finished = FinishedObjective { found, best };
+                    let finished = FinishedObjective {
+                        found,
+                        best: best.alpha,
+                        gave_way: best.gave_way,
+                    };
                     work.finished(|state| {
                         state.finished.push(finished.clone());
                         state.steps.clear();
@@ -114,11 +118,8 @@ pub(super) fn find_lines(work: Work<'_, Raceline>) -> Result<Outcome> {
             record.add(&found.losses, found.backend.as_ref());
             let history = found.history.iter();
             let mut best = report(&finished.best)?;
-            if !settings.searches_locally() {
-                // A line that has given way is on the road, and says no more that it was not.
-                let own = report(&found.alpha)?;
-                best.gave_way = own.gave_way.filter(|_| own.alpha == finished.best);
-            }
+            // A line that has given way is on the road, and says no more that it was not.
+            best.gave_way = best.gave_way.or(finished.gave_way);
             objectives.push(ObjectiveOutcome {
                 objective,
                 best,

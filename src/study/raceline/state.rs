@@ -21,6 +21,8 @@ pub(super) struct FinishedObjective {
     pub found: FoundLine,
     /// `alpha` of the best line, of theirs and of what came after.
     pub best: Vec<f64>,
+    /// By what share of the way to the reference line it gave way, where nothing less brought it onto the road.
+    pub gave_way: Option<f64>,
 }
 
 /// The state of a study. A checkpoint of it is resumed bit for bit on the backend where it began.
