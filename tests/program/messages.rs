@@ -150,10 +150,10 @@ fn a_line_is_driven_on_its_own_circuit() {
     let found = planned(&[]);
     assert!(found.status.success(), "{}", said(&found));
     assert!(said(&found).contains(AROUND_RING[1]), "{}", said(&found));
-    // A road of 1.5 m has a line for a car of 1.3 m. A line for a car that is declared 3 m wide has room for one of 2 m.
+    // A road of 2 m has a line for a car of 1.3 m. A line for a car that is declared 3 m wide has room for one of 2 m.
     for (track, car_width_m, [fits, wide]) in [
-        ("circle:99.25:100.75", 1.3, ["1.4", "2"]),
-        ("circle:98.75:101.25", 3.0, ["2.4", "3"]),
+        ("circle:99:101", 1.3, ["1.4", "2"]),
+        ("circle:98:101", 3.0, ["2.4", "3"]),
     ] {
         let of_run = RacelineSettings {
             track: track.to_owned(),
