@@ -288,9 +288,10 @@ pub fn name_or_file() -> Spec<NameOrFile> {
 /// See [`name_or_file`].
 pub struct NameOrFile;
 
-/// Whether a name is a file's: bundled names have no extension.
+/// Whether a name is a file's: bundled names have no extension, and what follows the last point of a shape's is digits.
 fn is_file(name: &str) -> bool {
-    Path::new(name).extension().is_some()
+    let extension = Path::new(name).extension();
+    extension.is_some_and(|e| !e.to_string_lossy().chars().all(|c| c.is_ascii_digit()))
 }
 
 impl Kind<String> for NameOrFile {
@@ -500,5 +501,25 @@ impl<T: Settings> Shared<T> {
                 setting.within(lens)
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shape_with_decimals_is_no_file() {
+        for name in [
+            "gt",
+            "circle:590:600",
+            "circle:99.25:100.75",
+            "ellipse:400:250:12.5",
+        ] {
+            assert!(!is_file(name), "{name}");
+        }
+        for name in ["car.toml", "../tracks/club.csv", "lap.7z"] {
+            assert!(is_file(name), "{name}");
+        }
     }
 }
