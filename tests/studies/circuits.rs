@@ -154,8 +154,8 @@ fn a_line_gives_way_on_a_narrow_road() {
 }
 
 /// With all lengths a quarter and all times half, nothing changes but the unit. The hairpins then have the radius of those of Formula
-/// Student. With the stages of large roads the lap was 0.9 % slower there, and with points of the fine spline 1 m apart on roads of either
-/// size it is 0.2 %. What is left is 0.12 %.
+/// Student. With the stages of large roads the lap was 0.9 % slower there, and 0.2 % with points of the fine spline 1 m apart on roads of
+/// either size. What is left is 0.12 %.
 #[test]
 fn small_roads_are_solved_as_large_ones() {
     let folder = tempfile::tempdir().expect("a folder");

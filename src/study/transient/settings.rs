@@ -28,7 +28,7 @@ settings! {
         envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
             "The g-g-v envelope from a table instead of the car's own";
         car_width_m: Option<f64> ["m"] = None, optional(number(0.0, 10.0)).example("1.3"),
-            "Width of the car, all of which stays within the edges; without it that of the run in whose folder the line lies, 2 m at the most";
+            "Width of the car, all of which stays within the edges; without it 2 m, or that of the run in whose folder the line lies where it is less";
         steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
             "Fastest turn of the front wheels; without it the car's own";
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),

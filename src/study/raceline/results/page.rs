@@ -64,8 +64,8 @@ pub fn write(folder: &Path, solved: &Solved<'_, Raceline>, summary: &Summary) ->
     corners(&mut page, setup, &lines)?;
     page.table(
         "Lines compared",
-        "Values at the cross-sections are what the solvers see. Fine values are on a spline at 1 m or less through them, and are \
-         the ones to believe. Clearance is the least distance from the car, its corners in bends \
+        "Values at the cross-sections are what the solvers see. Fine values are on a spline through them with \
+         points 1 m apart at the most, and are the ones to believe. Clearance is the least distance from the car, its corners in bends \
          included, to the edges.",
         &lines_table(summary),
     )?;
