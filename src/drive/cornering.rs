@@ -1,5 +1,7 @@
 //! What a driver knows of a car: its steady cornering, as a map over the speed and the share of the grip that is used.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::driver::STEER_LAG_S;
 use super::plan::load_mps2;
 use crate::error::{Error, Result};
@@ -121,6 +123,7 @@ pub(super) const PREVIEW_S: (f64, f64) = (0.05, 0.5);
 /// By how much steering has to be ahead of a bend (s): the lag of the arms, and that of the lateral acceleration behind the steering in
 /// slow changes. That of a single-track car (M. Mitschke, H. Wallentowitz, *Dynamik der Kraftfahrzeuge*) whose axles slip by these
 /// angles (rad, front and rear) at this speed (m/s) and lateral acceleration (m/s^2).
+#[allow(clippy::disallowed_methods, reason = "no part of a kernel")]
 fn preview_s(car: &Car, speed: f64, ay: f64, slips: [f64; 2]) -> f64 {
     let c = &car.chassis;
     let (mass, inertia, a, b) = (c.mass, c.inertia_yaw, c.cg_to_front, c.cg_to_rear);
@@ -158,10 +161,12 @@ impl<R: Lookup> SpeedPlace<R> {
     pub fn limits(&self, map: &CorneringMap<R::Storage>) -> [R; 2] {
         let number = self.row * R::lit((SHARES + 1) as f64);
         let (place, _) = number.place(map.figures.len() / CORNERING_WIDTH, CORNERING_WIDTH);
-        [2, 3].map(|k| {
-            let below = R::pick(&map.figures, place, k);
-            below + self.share * (R::pick(&map.figures, place, ROW + k) - below)
-        })
+        let mut limits = [R::lit(0.0); 2];
+        for (k, limit) in limits.iter_mut().enumerate() {
+            let below = R::pick(&map.figures, place, 2 + k);
+            *limit = below + self.share * (R::pick(&map.figures, place, ROW + 2 + k) - below);
+        }
+        limits
     }
 
     /// Steering beyond the geometry's and the slip angle of the rear axle (rad) at a share of the grip, which has the sign of the bend.
@@ -173,12 +178,16 @@ impl<R: Lookup> SpeedPlace<R> {
         let part = used - column;
         let number = self.row * R::lit((SHARES + 1) as f64) + column;
         let (place, _) = number.place(map.figures.len() / CORNERING_WIDTH, CORNERING_WIDTH);
-        [0, 1].map(|k| {
-            let [a, b, c, d] = [0, CORNERING_WIDTH, ROW, ROW + CORNERING_WIDTH]
-                .map(|beyond| R::pick(&map.figures, place, beyond + k));
+        let mut angles = [zero; 2];
+        for (k, angle) in angles.iter_mut().enumerate() {
+            let a = R::pick(&map.figures, place, k);
+            let b = R::pick(&map.figures, place, CORNERING_WIDTH + k);
+            let c = R::pick(&map.figures, place, ROW + k);
+            let d = R::pick(&map.figures, place, ROW + CORNERING_WIDTH + k);
             let (below, above) = (a + part * (b - a), c + part * (d - c));
-            let angle = below + self.share * (above - below);
-            R::select(share.less_than(zero), -angle, angle)
-        })
+            let size = below + self.share * (above - below);
+            *angle = R::select(share.less_than(zero), -size, size);
+        }
+        angles
     }
 }

@@ -1,12 +1,14 @@
 //! The driver: steering by preview and feedback, drive and brake by limited wheel slip. Twin of `shaders/driver.wgsl`.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::cornering::{CorneringMap, SpeedPlace};
 use super::path::{View, curvature_ahead};
 use super::relief::Footing;
 use super::road::{Course, FRONT_CELLS, PLAN_REACH_M, Road};
 use super::settings::DriverSettings;
 use crate::error::{Error, Result};
-use crate::scalar::{Lookup, Real};
+use crate::scalar::{Lookup, Part, Real};
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::model::wheel_speeds;
 use crate::vehicle::powertrain::{GRAVITY_MPS2, Powertrain};
@@ -234,6 +236,7 @@ impl WheelTorque<f64> {
     }
 
     /// The figures in the precision that the scalar `R` stores tables in.
+    #[allow(clippy::disallowed_methods, reason = "no part of a kernel")]
     pub fn stored<R: Real>(&self) -> WheelTorque<R::Storage> {
         WheelTorque {
             stretches: self.stretches.iter().map(|s| s.map(R::store)).collect(),
@@ -307,108 +310,150 @@ pub fn planned_speed<R: Lookup>(
     speed + pace.share * (faster - speed)
 }
 
+/// What the driver goes by in a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Act<'a, R: Real> {
+    /// The driver.
+    pub driver: &'a DriverTable<R::Storage>,
+    /// What the powertrain gives.
+    pub torque: &'a WheelTorque<R::Storage>,
+    /// What he takes the car's steady cornering for.
+    pub cornering: &'a CorneringMap<R::Storage>,
+    /// The lines and their plans.
+    pub road: &'a Road<R::Storage>,
+    /// The line that he follows.
+    pub course: &'a Course<R>,
+    /// How fast.
+    pub pace: &'a Pace<R>,
+    /// His car.
+    pub chassis: &'a Chassis<R>,
+    /// How it moves.
+    pub state: &'a CarState<R>,
+    /// Where it is.
+    pub view: &'a View<R>,
+    /// The road under it, if that is not level and dry.
+    pub footing: Option<&'a Footing<R>>,
+    /// Where his arms and feet are.
+    pub controls: &'a Controls<R>,
+}
+
 /// Moves arms and feet for one step.
 #[inline(always)]
-pub fn act<R: Lookup>(
-    driver: &DriverTable<R::Storage>,
-    (torque, cornering): (&WheelTorque<R::Storage>, &CorneringMap<R::Storage>),
-    road: &Road<R::Storage>,
-    (course, pace): (&Course<R>, &Pace<R>),
-    c: &Chassis<R>,
-    (state, view, footing): (&CarState<R>, &View<R>, Option<&Footing<R>>),
-    controls: &Controls<R>,
-) -> Controls<R> {
-    let zero = R::lit(0.0);
-    let one = R::lit(1.0);
-    let step = R::load(driver.step);
-    let knows = R::load(driver.knows);
-    let body = &state.body;
-    let v = body.vx.max(R::lit(LEAST_SPEED));
-    let wheelbase = c.cg_to_front + c.cg_to_rear;
-    let path = &road.path;
-    let pose = &view.pose;
-    let aero = aero_forces(c, v, view.row.flap);
-    let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
-    let friction = footing.map_or(one, |footing| footing.friction);
-    let speed = SpeedPlace::of(v);
-    let [own_friction, preview] = speed.limits(cornering);
-    let grip = friction * own_friction * weight / c.mass;
-    let behind = planned_speed(road, course, pace, view, R::load(driver.speed_ahead) * v) - body.vx;
-    let look = R::load(driver.plan_ahead) * v;
-    let reach = R::load(driver.reach);
-    let before = planned_speed(road, course, pace, view, look - reach);
-    let after = planned_speed(road, course, pace, view, look + reach);
-    let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
-    // Feed-forward: geometry plus the slip of both axles in steady cornering; feedback: offset, heading and the yaw rate that the
-    // present curvature asks for.
-    let curvature = curvature_ahead(path, course, pose, preview * v);
-    let bend = view.bend;
-    // The speed that one who knows the car will have there.
-    let speed_ahead = (v + knows * planned * preview).max(R::lit(LEAST_SPEED));
-    let mut across_ahead = curvature * speed_ahead * speed_ahead;
-    let mut across = bend * v * v;
-    let mut turning = body.yaw_rate * v;
-    // On a banked road the tyres bear gravity's part too. The driver knows it, and the gradient, from the road under him.
-    if let Some(footing) = footing {
-        across_ahead = across_ahead + footing.lean;
-        across = across + footing.lean;
-        turning = turning + footing.lean;
-    }
-    // On a slippery road tyres slip less before they let go.
-    let held = knows * grip + (one - knows) * (friction * R::lit(GUESSED_G * GRAVITY_MPS2));
-    let [understeer, _] = speed.angles(cornering, across_ahead / held);
-    let [_, rear_slip] = speed.angles(cornering, across / held);
-    let (understeer, rear_slip) = (friction * understeer, friction * rear_slip);
-    let sideslip = knows * (c.cg_to_rear * bend - rear_slip);
-    let heading =
-        view.heading_error + sideslip + view.offset * R::lit(0.9) / (v * R::lit(0.45) + R::lit(3.0));
-    let yaw_lack = curvature_ahead(path, course, pose, R::lit(0.08) * v) * v - body.yaw_rate;
-    let wanted = wheelbase * curvature + understeer - R::load(driver.heading_gain) * heading
-        + R::lit(0.045) * yaw_lack;
-    let most = R::load(driver.max_steer);
-    let wanted = wanted.max(-most).min(most);
-    let fastest = R::load(driver.steer_rate);
-    let rate = ((wanted - controls.steer) / R::load(driver.steer_lag))
-        .max(-fastest)
-        .min(fastest);
+pub fn act<R: Lookup>(by: Act<'_, R>) -> Controls<R> {
+    // The same for every model of tyres.
+    R::apart(by)
+}
 
-    let wanted = planned + R::load(driver.speed_gain) * behind;
-    let mut force = c.mass * wanted + aero.drag;
-    if let Some(footing) = footing {
-        force = force + c.mass * footing.climb;
-    }
-    // What a bend leaves of the tyres, by the friction circle. The bend is the mean of the path's and the one that the car turns.
-    let used = knows * (R::lit(0.5) * (turning + across) / grip).abs();
-    let used = used.min(one);
-    let left = (one - used * used).max(R::lit(0.01)).sqrt();
-    let limit = friction * R::load(driver.slip_limit) * left;
-    // The foot moves until the car gains what is wanted. How much slip that takes, the tyres know and the driver does not: he goes no
-    // further than soft tyres would need, or he would spin the wheels of a car that gains no more.
-    let stiffness = R::load(driver.driven_share) * weight * R::load(driver.slip_stiffness);
-    let drives = !controls.rear_slip.less_than(zero);
-    let pedal = R::select(drives, controls.rear_slip, controls.front_slip);
-    let asked = pedal + c.mass * (wanted - controls.gain) / stiffness;
-    let rim_speed = v * (one + controls.rear_slip.max(zero));
-    let pull = torque_at(torque, rim_speed / c.radius_rear) / c.radius_rear;
-    // What the wheels take to roll and to be turned faster does not reach the road.
-    let rotating = R::load(driver.rotating);
-    let most = (pull - c.mass * R::load(driver.rolling) + (rotating - one) * aero.drag) / rotating;
-    let within = controls.rear_slip.max(zero) + (most - controls.rear_force) / stiffness;
-    let driven = asked
-        .min(within.max(zero))
-        .min(limit)
-        .min((force / stiffness).max(zero));
-    let braked = asked.max(-limit);
-    let brakes = asked.less_than(zero);
-    let front = R::select(brakes, braked, zero);
-    let rear = R::select(brakes, R::lit(0.75) * braked, driven);
-    let lag = R::load(driver.pedal_lag);
-    Controls {
-        steer: controls.steer + rate * step,
-        front_slip: controls.front_slip + (front - controls.front_slip) * step / lag,
-        rear_slip: controls.rear_slip + (rear - controls.rear_slip) * step / lag,
-        rear_force: controls.rear_force,
-        gain: controls.gain,
+impl<R: Lookup> Part for Act<'_, R> {
+    type Output = Controls<R>;
+
+    #[inline(always)]
+    fn run(self) -> Controls<R> {
+        let Self {
+            driver,
+            torque,
+            cornering,
+            road,
+            course,
+            pace,
+            chassis: c,
+            state,
+            view,
+            footing,
+            controls,
+        } = self;
+        let zero = R::lit(0.0);
+        let one = R::lit(1.0);
+        let step = R::load(driver.step);
+        let knows = R::load(driver.knows);
+        let body = &state.body;
+        let v = body.vx.max(R::lit(LEAST_SPEED));
+        let wheelbase = c.cg_to_front + c.cg_to_rear;
+        let path = &road.path;
+        let pose = &view.pose;
+        let aero = aero_forces(c, v, view.row.flap);
+        let weight = c.mass * c.gravity + (aero.downforce_front + aero.downforce_rear);
+        let friction = footing.map_or(one, |footing| footing.friction);
+        let speed = SpeedPlace::of(v);
+        let [own_friction, preview] = speed.limits(cornering);
+        let grip = friction * own_friction * weight / c.mass;
+        let behind = planned_speed(road, course, pace, view, R::load(driver.speed_ahead) * v) - body.vx;
+        let look = R::load(driver.plan_ahead) * v;
+        let reach = R::load(driver.reach);
+        let before = planned_speed(road, course, pace, view, look - reach);
+        let after = planned_speed(road, course, pace, view, look + reach);
+        let planned = (after * after - before * before) / R::lit(4.0 * PLAN_REACH_M);
+        // Feed-forward: geometry plus the slip of both axles in steady cornering; feedback: offset, heading and the yaw rate that the
+        // present curvature asks for.
+        let curvature = curvature_ahead(path, course, pose, preview * v);
+        let bend = view.bend;
+        // The speed that one who knows the car will have there.
+        let speed_ahead = (v + knows * planned * preview).max(R::lit(LEAST_SPEED));
+        let mut across_ahead = curvature * speed_ahead * speed_ahead;
+        let mut across = bend * v * v;
+        let mut turning = body.yaw_rate * v;
+        // On a banked road the tyres bear gravity's part too. The driver knows it, and the gradient, from the road under him.
+        if let Some(footing) = footing {
+            across_ahead = across_ahead + footing.lean;
+            across = across + footing.lean;
+            turning = turning + footing.lean;
+        }
+        // On a slippery road tyres slip less before they let go.
+        let held = knows * grip + (one - knows) * (friction * R::lit(GUESSED_G * GRAVITY_MPS2));
+        let [understeer, _] = speed.angles(cornering, across_ahead / held);
+        let [_, rear_slip] = speed.angles(cornering, across / held);
+        let (understeer, rear_slip) = (friction * understeer, friction * rear_slip);
+        let sideslip = knows * (c.cg_to_rear * bend - rear_slip);
+        let heading =
+            view.heading_error + sideslip + view.offset * R::lit(0.9) / (v * R::lit(0.45) + R::lit(3.0));
+        let yaw_lack = curvature_ahead(path, course, pose, R::lit(0.08) * v) * v - body.yaw_rate;
+        let wanted = wheelbase * curvature + understeer - R::load(driver.heading_gain) * heading
+            + R::lit(0.045) * yaw_lack;
+        let most = R::load(driver.max_steer);
+        let wanted = wanted.max(-most).min(most);
+        let fastest = R::load(driver.steer_rate);
+        let rate = ((wanted - controls.steer) / R::load(driver.steer_lag))
+            .max(-fastest)
+            .min(fastest);
+
+        let wanted = planned + R::load(driver.speed_gain) * behind;
+        let mut force = c.mass * wanted + aero.drag;
+        if let Some(footing) = footing {
+            force = force + c.mass * footing.climb;
+        }
+        // What a bend leaves of the tyres, by the friction circle. The bend is the mean of the path's and the one that the car turns.
+        let used = knows * (R::lit(0.5) * (turning + across) / grip).abs();
+        let used = used.min(one);
+        let left = (one - used * used).max(R::lit(0.01)).sqrt();
+        let limit = friction * R::load(driver.slip_limit) * left;
+        // The foot moves until the car gains what is wanted. How much slip that takes, the tyres know and the driver does not: he goes no
+        // further than soft tyres would need, or he would spin the wheels of a car that gains no more.
+        let stiffness = R::load(driver.driven_share) * weight * R::load(driver.slip_stiffness);
+        let drives = !controls.rear_slip.less_than(zero);
+        let pedal = R::select(drives, controls.rear_slip, controls.front_slip);
+        let asked = pedal + c.mass * (wanted - controls.gain) / stiffness;
+        let rim_speed = v * (one + controls.rear_slip.max(zero));
+        let pull = torque_at(torque, rim_speed / c.radius_rear) / c.radius_rear;
+        // What the wheels take to roll and to be turned faster does not reach the road.
+        let rotating = R::load(driver.rotating);
+        let most = (pull - c.mass * R::load(driver.rolling) + (rotating - one) * aero.drag) / rotating;
+        let within = controls.rear_slip.max(zero) + (most - controls.rear_force) / stiffness;
+        let driven = asked
+            .min(within.max(zero))
+            .min(limit)
+            .min((force / stiffness).max(zero));
+        let braked = asked.max(-limit);
+        let brakes = asked.less_than(zero);
+        let front = R::select(brakes, braked, zero);
+        let rear = R::select(brakes, R::lit(0.75) * braked, driven);
+        let lag = R::load(driver.pedal_lag);
+        Controls {
+            steer: controls.steer + rate * step,
+            front_slip: controls.front_slip + (front - controls.front_slip) * step / lag,
+            rear_slip: controls.rear_slip + (rear - controls.rear_slip) * step / lag,
+            rear_force: controls.rear_force,
+            gain: controls.gain,
+        }
     }
 }
 

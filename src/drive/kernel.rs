@@ -1,7 +1,9 @@
 //! One step of the closed loop, and a lap of them: look, judge, act, move. Twin of `shaders/drive.wgsl`.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::cornering::CorneringMap;
-use super::driver::{Controls, DriverTable, Pace, WheelTorque, act, car_input, planned_speed};
+use super::driver::{Act, Controls, DriverTable, Pace, WheelTorque, act, car_input, planned_speed};
 use super::path::{Pose, View, look};
 use super::relief::{Footing, footing};
 use super::road::{Course, Road};
@@ -231,15 +233,19 @@ pub fn drive_step<R: Lookup, T: Tyre<R>>(
             &loaded
         }
     };
-    let mut controls = act(
+    let mut controls = act(Act {
         driver,
-        (world.torque, world.cornering),
+        torque: world.torque,
+        cornering: world.cornering,
         road,
-        (course, pace),
-        &car.chassis,
-        (&before.car, &view, footing.as_ref()),
-        &before.controls,
-    );
+        course,
+        pace,
+        chassis: &car.chassis,
+        state: &before.car,
+        view: &view,
+        footing: footing.as_ref(),
+        controls: &before.controls,
+    });
     let friction = footing.map(|footing| footing.friction);
     let input = car_input(&car.chassis, &before.car, &controls, view.row.flap, friction);
     watch(&Moment {

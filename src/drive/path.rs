@@ -1,5 +1,7 @@
 //! The path that is followed, in the frame of its samples, and the car's place relative to it. Twin of `shaders/path.wgsl`.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::road::{Course, PATH_WIDTH};
 use crate::scalar::Lookup;
 

@@ -146,11 +146,11 @@ pub fn drive_until_lost(
     let flat = car.to_flat();
     Ok(match car.tyre_model() {
         TyreModel::MagicFormula => {
-            let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]);
+            let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat);
             record(&car, &world, interval_s, motor)
         }
         TyreModel::Linear => {
-            let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]);
+            let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(&flat);
             record(&car, &world, interval_s, motor)
         }
     })

@@ -5,6 +5,8 @@
 //! pulls at its body by `g e_z.T` backwards and `g e_z.L` to the right. How the road's own pitch and roll turn the body is left out.
 //! The friction is that under the car's middle; all wheels have it.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::path::View;
 use super::road::Course;
 use crate::scalar::{Lookup, Real};
@@ -68,10 +70,12 @@ pub fn footing<R: Lookup>(table: &[R::Storage], course: &Course<R>, view: &View<
     let number = course.path_at + view.pose.row;
     let (place, _) = number.place(table.len() / RELIEF_WIDTH, RELIEF_WIDTH);
     let share = view.pose.along * course.per_metre;
-    let [climb, lean, press, dip, friction, per_m] = [0, 1, 2, 3, 4, 5].map(|column| {
+    let mut figures = [R::lit(0.0); 6];
+    for (column, figure) in figures.iter_mut().enumerate() {
         let here = R::pick(table, place, column);
-        here + share * (R::pick(table, place, RELIEF_WIDTH + column) - here)
-    });
+        *figure = here + share * (R::pick(table, place, RELIEF_WIDTH + column) - here);
+    }
+    let [climb, lean, press, dip, friction, per_m] = figures;
     let load = press + speed * speed * dip;
     Footing {
         // The car points to the left of the path by a small angle.

@@ -109,7 +109,7 @@ impl FreeCar {
         let flat = self.flat(candidate);
         let tyre_count = TyreCoefficients::<f64>::PARAMETERS.len();
         let front = flat.len() - 2 * tyre_count;
-        let at = |offset: usize| TyreCoefficients::from_flat(|i| flat[offset + i]).well_formed();
+        let at = |offset: usize| TyreCoefficients::from_flat(&flat[offset..]).well_formed();
         let rear = front + tyre_count;
         let one_tyre = flat[front..rear] == flat[rear..];
         at(front)

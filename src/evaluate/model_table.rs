@@ -91,10 +91,14 @@ impl ModelTable {
     #[inline(always)]
     pub(crate) fn cars<L: Lanes, T: Tyre<L>>(&self, rows: &[f32], pack: Pack) -> CarModel<L, T> {
         let width = self.varying.len();
-        CarModel::from_table(|place| match self.sources[place] {
-            Some(figure) => L::from_fn(|lane| rows[pack.candidate(lane) * width + figure]),
-            None => L::load(self.base[place]),
-        })
+        let mut table = Vec::with_capacity(self.base.len());
+        for (base, source) in self.base.iter().zip(&self.sources) {
+            table.push(match source {
+                Some(figure) => L::from_fn(|lane| rows[pack.candidate(lane) * width + figure]),
+                None => L::load(*base),
+            });
+        }
+        CarModel::from_table(&table)
     }
 }
 
@@ -108,9 +112,7 @@ fn axles(figures: usize) -> [usize; 2] {
 fn ready(car: &FreeCar, candidate: &[f64]) -> Vec<f64> {
     let flat = car.flat(candidate);
     match car.tyre_model() {
-        TyreModel::MagicFormula => {
-            CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).to_table()
-        }
-        TyreModel::Linear => CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]).to_table(),
+        TyreModel::MagicFormula => CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat).to_table(),
+        TyreModel::Linear => CarModel::<f64, LinearTyre<f64>>::from_parameters(&flat).to_table(),
     }
 }

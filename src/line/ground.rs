@@ -7,6 +7,8 @@
 //! of the load `f_N`, of which [`EnvelopeTable::loads`] has several. What tyres can do goes with the friction of the road; what they take
 //! from the drive in a bend goes with its square, since their slip angles go with it, too.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::kernel::{Course, alpha, held, look_up};
 use super::loads::LoadTables;
 use super::plan::{LinePlan, ReliefRow};
@@ -87,12 +89,8 @@ impl<R: Lookup> Ground<R> for R {
 
     #[inline(always)]
     fn limits(self, envelope: &EnvelopeTable<R::Storage>, speed_squared: R) -> ([R; 4], R) {
-        let rows = envelope.rows.len() / ENVELOPE_WIDTH;
         let argument = speed_squared * R::load(envelope.rows_per_speed_squared);
-        let (place, beyond) = argument.place(rows, ENVELOPE_WIDTH);
-        let row = R::pick_row(&envelope.rows, place);
-        let limits: [R; 4] =
-            std::array::from_fn(|column| row[column] + beyond * row[ENVELOPE_WIDTH / 2 + column]);
+        let limits = argument.between_rows(&envelope.rows);
         let share = self * speed_squared / limits[0];
         let root = (R::lit(1.0) - share * share).max(R::lit(0.0)).sqrt();
         (limits, root)
@@ -111,7 +109,7 @@ impl<R: Lookup> Ground<R> for R {
         let radius = R::lit(1.0) / self.max(R::lit(1e-6));
         let (place, beyond) =
             (radius * R::load(envelope.rows_per_radius)).place(envelope.corners.len() / 2, 2);
-        look_up(&envelope.corners, 2, place, beyond, 0)
+        look_up(&envelope.corners, place, beyond)
     }
 
     #[inline(always)]
@@ -291,8 +289,11 @@ impl<R: Lookup> Ground<R> for Sloped<R> {
         let low = Self::traction_of(loads, layer.below, cell, beyond);
         let high = Self::traction_of(loads, layer.below + R::lit(1.0), cell, beyond);
         // Beyond the loads that were swept the tyres give nothing back.
-        let [left, lost] = [0, 1].map(|i| (low[i] + layer.share * (high[i] - low[i])).max(R::lit(0.0)));
-        [left, self.friction * self.friction * lost]
+        let mut left = [R::lit(0.0); 2];
+        for i in 0..2 {
+            left[i] = (low[i] + layer.share * (high[i] - low[i])).max(left[i]);
+        }
+        [left[0], self.friction * self.friction * left[1]]
     }
 
     /// Where the lateral limit is passed: by Newton's method from above, which bisection helps where it leaves what is known.
@@ -403,8 +404,14 @@ impl<R: Real> Rising<R> {
     pub fn turned(&self, before: &Self, [sin, cos]: [R; 2]) -> [R; 4] {
         let (half, one) = (R::lit(0.5), R::lit(1.0));
         let (after, before_it) = (self.direction, before.direction);
-        let [x, y, up] = [0, 1, 2].map(|k| after[k] - before_it[k]);
-        let [forward_x, forward_y, slope] = [0, 1, 2].map(|k| half * (after[k] + before_it[k]));
+        let (x, y, up) = (
+            after[0] - before_it[0],
+            after[1] - before_it[1],
+            after[2] - before_it[2],
+        );
+        let forward_x = half * (after[0] + before_it[0]);
+        let forward_y = half * (after[1] + before_it[1]);
+        let slope = half * (after[2] + before_it[2]);
         let level = (forward_x * forward_x + forward_y * forward_y)
             .max(R::lit(1e-8))
             .sqrt();

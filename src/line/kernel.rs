@@ -8,6 +8,8 @@
 //! J. Subosits and J. C. Gerdes, *A sequential two-step algorithm for fast generation of vehicle racing trajectories*,
 //! J. Dyn. Sys., Meas., Control 138, 2016).
 
+#![deny(clippy::disallowed_methods)]
+
 use super::ground::{Ground, Grounds, LevelRoad, SlopedRoad, relieve};
 use super::plan::{LinePlan, SectionRow};
 use super::point_mass::EnvelopeTable;
@@ -219,16 +221,10 @@ pub fn shape<R: Real>(
     }
 }
 
-/// The figure of `column` at `argument`, counted in rows of `width` of which half are figures and half rises.
+/// The figure `beyond` a place, from a table of figures and their rises.
 #[inline(always)]
-pub(super) fn look_up<R: Lookup>(
-    table: &[R::Storage],
-    width: usize,
-    place: R::Place,
-    beyond: R,
-    column: usize,
-) -> R {
-    R::pick(table, place, column) + beyond * R::pick(table, place, width / 2 + column)
+pub(super) fn look_up<R: Lookup>(table: &[R::Storage], place: R::Place, beyond: R) -> R {
+    R::pick(table, place, 0) + beyond * R::pick(table, place, 1)
 }
 
 /// Greatest speed squared (m^2/s^2) in a bend.
@@ -264,7 +260,7 @@ fn left_for_braking<R: Lookup>(envelope: &EnvelopeTable<R::Storage>, root: R) ->
     }
     let rows = envelope.ellipse.len() / 2;
     let (place, beyond) = (root * R::lit(rows as f64)).place(rows, 2);
-    look_up(&envelope.ellipse, 2, place, beyond, 0)
+    look_up(&envelope.ellipse, place, beyond)
 }
 
 /// The same for driving, and what the tyres take from the drive (m/s^2).
@@ -308,7 +304,11 @@ pub(super) fn driving_with_drs<R: Lookup>(
     };
     let open = driving_at(open, speed_squared, ground);
     let pays = (shut[0].min(shut[1]) - shut[2]).less_than(open[0].min(open[1]) - open[2]);
-    std::array::from_fn(|i: usize| R::select(pays, open[i], shut[i]))
+    let mut best = shut;
+    for i in 0..best.len() {
+        best[i] = R::select(pays, open[i], shut[i]);
+    }
+    best
 }
 
 /// Greatest acceleration (m/s^2) at a speed squared in a bend; `drs` says whether the DRS may be open.
@@ -433,7 +433,7 @@ fn lap_on<R: Lookup, G: Grounds<R>>(
     let start = if closed { start } else { 0 };
     speeds[start] = if closed {
         let before = if start > 0 { start - 1 } else { n - 1 };
-        let [from, to] = [before, start].map(|section| G::at(course, section, section));
+        let [from, to] = [G::at(course, before, before), G::at(course, start, start)];
         steered_corner(envelope.at(start), length[before], from, to)
     } else {
         corner(envelope.at(start), G::at(course, start, start))
@@ -459,7 +459,7 @@ fn lap_on<R: Lookup, G: Grounds<R>>(
         let most = if again {
             speeds[next]
         } else {
-            let [from, to] = [here, next].map(|section| G::at(course, section, section));
+            let [from, to] = [G::at(course, here, here), G::at(course, next, next)];
             steered_corner(envelope.at(next), length[here], from, to)
         };
         let slower = reached.less_than(most);

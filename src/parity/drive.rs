@@ -236,8 +236,9 @@ fn trail<R: Lookup>(
     stops: impl Iterator<Item = u32>,
 ) -> (Vec<[R; STATE]>, u32) {
     let flat = problem.free.flat(candidate);
-    let ready = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).to_table();
-    let car = CarModel::<R, MagicFormula<R>>::from_table(|i| R::lit(ready[i]));
+    let ready = CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat).to_table();
+    let ready: Vec<R> = ready.into_iter().map(R::lit).collect();
+    let car = CarModel::<R, MagicFormula<R>>::from_table(&ready);
     let road = problem.road().stored::<R>();
     let world = World {
         road: &road,

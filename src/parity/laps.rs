@@ -30,7 +30,8 @@ pub fn work_of(replay: &ReplayProblem) -> (usize, u64) {
     let base = replay.free.base();
     let samples: usize = replay.plan.windows.iter().map(|w| w.end - w.start - 1).sum();
     let steps = samples * replay.plan.fractions.len();
-    let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(|i| Counted(base[i] as f32));
+    let base: Vec<Counted> = base.iter().map(|x| Counted(*x as f32)).collect();
+    let car = CarModel::<Counted, MagicFormula<Counted>>::from_parameters(&base);
     let window = &replay.plan.windows[0];
     let sample = &replay.plan.samples[window.start];
     let input = CarInput {

@@ -69,16 +69,14 @@ pub fn problem_by(car: Car, objectives: &[SteadyObjective]) -> Result<SteadyProb
 fn table(problem: &SteadyProblem, candidate: &[f64]) -> Vec<f64> {
     let flat = problem.free.flat(candidate);
     match problem.tyre_model() {
-        TyreModel::MagicFormula => {
-            CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).to_table()
-        }
-        TyreModel::Linear => CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]).to_table(),
+        TyreModel::MagicFormula => CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat).to_table(),
+        TyreModel::Linear => CarModel::<f64, LinearTyre<f64>>::from_parameters(&flat).to_table(),
     }
 }
 
 fn settled_on<R: Real, T: Tyre<R>>(problem: &SteadyProblem, candidate: &[f64], steps: u32) -> Settling<R> {
-    let table = table(problem, candidate);
-    let car = CarModel::<R, T>::from_table(|i| R::lit(table[i]));
+    let table: Vec<R> = table(problem, candidate).into_iter().map(R::lit).collect();
+    let car = CarModel::<R, T>::from_table(&table);
     let [speed, steer] = problem.aim_figures(candidate).map(R::lit);
     let mut plan = problem.plan().stored::<R>();
     plan.steps = plan.steps.min(steps);

@@ -46,12 +46,12 @@ fn case(model: TyreModel, base: &Car, random: &mut Draws) -> Option<Case> {
         TyreModel::MagicFormula => {
             let (chassis, tyre) = (Chassis::<f64>::PARAMETERS.len(), model.parameters().len());
             for axle in 0..2 {
-                let at = |i: usize| flat[chassis + axle * tyre + i];
-                TyreCoefficients::from_flat(at).well_formed().ok()?;
+                let tyre = TyreCoefficients::from_flat(&flat[chassis + axle * tyre..]);
+                tyre.well_formed().ok()?;
             }
-            CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).to_table()
+            CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat).to_table()
         }
-        TyreModel::Linear => CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]).to_table(),
+        TyreModel::Linear => CarModel::<f64, LinearTyre<f64>>::from_parameters(&flat).to_table(),
     };
     let vx = random.within(10.0, 70.0);
     let state = [
@@ -118,16 +118,16 @@ impl Case {
     }
 }
 
-/// The outputs in the scalar `R` of what `at` yields by its place in [`Case::row`].
+/// The outputs in the scalar `R` of a [`Case::row`].
 #[inline(always)]
-fn outputs<R: Real, T: Tyre<R>>(at: impl Fn(usize) -> R) -> [R; OUTPUTS] {
-    let car = CarModel::<R, T>::from_table(|i| at(13 + i));
-    let state = CarState::from_array(std::array::from_fn(&at));
+fn outputs<R: Real, T: Tyre<R>>(row: &[R]) -> [R; OUTPUTS] {
+    let car = CarModel::<R, T>::from_table(&row[13..]);
+    let state = CarState::from_array(std::array::from_fn(|i| row[i]));
     let input = CarInput {
-        wheel_speed: std::array::from_fn(|i| at(6 + i)),
-        steer: at(10),
-        flap: at(11),
-        friction: Some(at(12)),
+        wheel_speed: std::array::from_fn(|i| row[6 + i]),
+        steer: row[10],
+        flap: row[11],
+        friction: Some(row[12]),
     };
     // A loop as in the kernel, whose count the compiler does not know: it would unroll a lone step of many lanes
     // until it ran out of stack.
@@ -154,11 +154,10 @@ fn outputs<R: Real, T: Tyre<R>>(at: impl Fn(usize) -> R) -> [R; OUTPUTS] {
 
 /// The outputs of a case in the scalar `R`.
 pub fn evaluated<R: Real>(model: TyreModel, case: &Case) -> [R; OUTPUTS] {
-    let row = case.row();
-    let at = |i: usize| R::lit(f64::from(row[i]));
+    let row: Vec<R> = case.row().iter().map(|x| R::lit(f64::from(*x))).collect();
     match model {
-        TyreModel::MagicFormula => outputs::<R, MagicFormula<R>>(at),
-        TyreModel::Linear => outputs::<R, LinearTyre<R>>(at),
+        TyreModel::MagicFormula => outputs::<R, MagicFormula<R>>(&row),
+        TyreModel::Linear => outputs::<R, LinearTyre<R>>(&row),
     }
 }
 
@@ -171,14 +170,12 @@ impl LaneWork for InLanes<'_> {
     fn run<L: Lanes>(self) -> Self::Output {
         let mut all = Vec::new();
         for pack in self.1.chunks(L::LANES) {
-            // Gathered before: in the car's code every gathering would be written out anew.
             let row: Vec<L> = (0..pack[0].len())
                 .map(|i| L::from_fn(|lane| pack[lane.min(pack.len() - 1)][i]))
                 .collect();
-            let at = |i: usize| row[i];
             let lanes = match self.0 {
-                TyreModel::MagicFormula => outputs::<L, MagicFormula<L>>(at),
-                TyreModel::Linear => outputs::<L, LinearTyre<L>>(at),
+                TyreModel::MagicFormula => outputs::<L, MagicFormula<L>>(&row),
+                TyreModel::Linear => outputs::<L, LinearTyre<L>>(&row),
             };
             let mut columns = [[0.0f32; 32]; OUTPUTS];
             for (column, lanes) in columns.iter_mut().zip(lanes) {
@@ -250,7 +247,7 @@ fn on_device(context: &GpuContext, model: TyreModel, cases: &[Case]) -> Result<V
 /// stages may double, plus the rounding of the state.
 pub fn scales(case: &Case) -> [f64; OUTPUTS] {
     let f = |x: f32| f64::from(x);
-    let car = Chassis::<f64>::from_flat(|i| f(case.table[i]));
+    let car = Chassis::from_flat(&case.table.iter().map(|x| f(*x)).collect::<Vec<f64>>());
     let [vx, vy, r, phi, p, pitch] = case.state.map(f);
     let downforce = car.air_density / 2.0 * (car.lift_area + car.drag_area) * vx * vx;
     let force = car.mass * car.gravity + downforce;

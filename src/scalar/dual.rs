@@ -1,15 +1,18 @@
 //! Forward-mode dual numbers: a value with its derivatives to `N` parameters, exact to rounding.
 //!
-//! The derivatives are a plain array, so that a loop over them becomes vector instructions inside whatever
-//! instruction set the caller was compiled for; a library type behind `Option` and without forced inlining
-//! does not.
+//! The derivatives are a plain array, so that a loop over them becomes vector instructions of whatever instruction set the surrounding
+//! function was compiled for ([`Real::apart`]). A library type behind `Option`, without forced inlining, does not.
 
-use super::Real;
+use super::{Part, Real};
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Derivatives of a dual number where nothing else is said: as many doubles as the widest register holds. It is one number for all
+/// uses, so that the car's equations are compiled for duals once.
+pub const GRADIENT: usize = 8;
 
 /// A value and its gradient to `N` parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dual<const N: usize> {
+pub struct Dual<const N: usize = GRADIENT> {
     /// The value.
     pub value: f64,
     /// The derivative to each parameter.
@@ -179,6 +182,27 @@ impl<const N: usize> Real for Dual<N> {
     #[inline(always)]
     fn select(mask: bool, if_true: Self, if_false: Self) -> Self {
         if mask { if_true } else { if_false }
+    }
+    /// With wider registers for gradients, where the processor has them.
+    #[inline(always)]
+    fn apart<P: Part>(part: P) -> P::Output {
+        #[inline(never)]
+        fn plain<P: Part>(part: P) -> P::Output {
+            part.run()
+        }
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[inline(never)]
+            #[target_feature(enable = "avx2")]
+            fn wide<P: Part>(part: P) -> P::Output {
+                part.run()
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has the set, as just detected.
+                return unsafe { wide(part) };
+            }
+        }
+        plain(part)
     }
 }
 

@@ -8,7 +8,7 @@
 //! set was detected: [`crate::evaluate::simd`] is the one place that does so.
 
 use super::elementary::{self, SinglePrecision};
-use super::{Lookup, Real};
+use super::{Lookup, Part, Real};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// A pack of lanes that can be filled from and read out to memory.
@@ -227,7 +227,7 @@ mod x86 {
 
     macro_rules! register_lanes {
         (
-            $(#[$doc:meta])* $name:ident($register:ty) x $lanes:literal, $mask_name:ident($mask:ty),
+            $(#[$doc:meta])* $name:ident($register:ty) x $lanes:literal of $set:literal, $mask_name:ident($mask:ty),
             set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident,
             sqrt $sqrt:ident, min $min:ident, max $max:ident,
             less $less:expr, select $select:expr, abs $abs:expr, neg $neg:expr, round $round:expr, odd $odd:expr, sign $sign:expr, pow $pow:expr, tie $tie:ident,
@@ -363,6 +363,16 @@ mod x86 {
                     // SAFETY: the set is there, as the module says.
                     unsafe { Self($select(mask.0, if_true.0, if_false.0)) }
                 }
+                #[inline(always)]
+                fn apart<P: Part>(part: P) -> P::Output {
+                    #[inline(never)]
+                    #[target_feature(enable = $set)]
+                    fn alone<P: Part>(part: P) -> P::Output {
+                        part.run()
+                    }
+                    // SAFETY: the set is there, as the module says.
+                    unsafe { alone(part) }
+                }
             }
 
             #[allow(dead_code, reason = "the narrowest lanes look tables up one by one")]
@@ -434,7 +444,7 @@ mod x86 {
 
     register_lanes! {
         /// Sixteen lanes in an AVX-512 register.
-        Avx512(__m512) x 16, Avx512Mask(__mmask16),
+        Avx512(__m512) x 16 of "avx512f,avx512dq", Avx512Mask(__mmask16),
         set1 _mm512_set1_ps, add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, div _mm512_div_ps,
         sqrt _mm512_sqrt_ps, min _mm512_min_ps, max _mm512_max_ps,
         less |a, b| _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
@@ -456,7 +466,7 @@ mod x86 {
 
     register_lanes! {
         /// Eight lanes in an AVX2 register.
-        Avx2(__m256) x 8, Avx2Mask(__m256),
+        Avx2(__m256) x 8 of "avx2", Avx2Mask(__m256),
         set1 _mm256_set1_ps, add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, div _mm256_div_ps,
         sqrt _mm256_sqrt_ps, min _mm256_min_ps, max _mm256_max_ps,
         less |a, b| _mm256_cmp_ps::<_CMP_LT_OQ>(a, b),
@@ -482,7 +492,7 @@ mod x86 {
 
     register_lanes! {
         /// Four lanes in an SSE2 register.
-        Sse2(__m128) x 4, Sse2Mask(__m128),
+        Sse2(__m128) x 4 of "sse2", Sse2Mask(__m128),
         set1 _mm_set1_ps, add _mm_add_ps, sub _mm_sub_ps, mul _mm_mul_ps, div _mm_div_ps,
         sqrt _mm_sqrt_ps, min _mm_min_ps, max _mm_max_ps,
         less |a, b| _mm_cmplt_ps(a, b),

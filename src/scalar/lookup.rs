@@ -3,16 +3,6 @@
 use super::lanes::Portable;
 use super::{Dual, Real};
 
-/// A part of a kernel. Implementations are `#[inline(always)]`, so that they are compiled for the instruction set of the function that
-/// they stand in.
-pub trait Part {
-    /// What it yields.
-    type Output;
-
-    /// Does it.
-    fn run(self) -> Self::Output;
-}
-
 /// A scalar, or a pack of them, that can be the argument of a table of rows.
 pub trait Lookup: Real {
     /// Where a row starts in its table, one place per lane.
@@ -35,15 +25,23 @@ pub trait Lookup: Real {
         std::array::from_fn(|column| Self::pick(table, place, column))
     }
 
+    /// Four figures at `self` counted in rows, linear between rows; from a table of whole rows of eight that is not empty: four figures
+    /// at the row's start, and their changes to the next row.
+    #[inline(always)]
+    fn between_rows(self, table: &[Self::Storage]) -> [Self; 4] {
+        let (place, beyond) = self.place(table.len() / 8, 8);
+        // Written out: lanes would leave their instruction set for a library function's closure.
+        let [a, b, c, d, rise_a, rise_b, rise_c, rise_d] = Self::pick_row(table, place);
+        [
+            a + beyond * rise_a,
+            b + beyond * rise_b,
+            c + beyond * rise_c,
+            d + beyond * rise_d,
+        ]
+    }
+
     /// Whether the mask holds in every lane.
     fn all(mask: Self::Mask) -> bool;
-
-    /// Does a part of a kernel in a function of its own, which has the instruction set of the scalar. All else of a kernel becomes one
-    /// function, and the time that a compiler takes grows faster than a function's length.
-    #[inline(never)]
-    fn apart<P: Part>(part: P) -> P::Output {
-        part.run()
-    }
 }
 
 macro_rules! lone_lookup {
@@ -222,7 +220,7 @@ mod x86 {
 
     macro_rules! wide_lookup {
         (
-            $name:ident, $set:literal, $index:ty, all $all:literal, truncate $truncate:ident, float $float:ident, set1 $set1:ident,
+            $name:ident, $index:ty, all $all:literal, truncate $truncate:ident, float $float:ident, set1 $set1:ident,
             min $min:ident, mul $mul:ident, add $add:ident, gather $gather:expr, rows $rows:ident
         ) => {
             impl Lookup for $name {
@@ -278,50 +276,40 @@ mod x86 {
                 fn all(mask: Self::Mask) -> bool {
                     Self::mask_bits(mask) == $all
                 }
-                #[inline(always)]
-                fn apart<P: Part>(part: P) -> P::Output {
-                    #[inline(never)]
-                    #[target_feature(enable = $set)]
-                    fn alone<P: Part>(part: P) -> P::Output {
-                        part.run()
-                    }
-                    // SAFETY: the set is there.
-                    unsafe { alone(part) }
-                }
             }
         };
     }
     wide_lookup!(
-        Avx512, "avx512f,avx512dq", __m512i, all 0xffff, truncate _mm512_cvttps_epi32, float _mm512_cvtepi32_ps, set1 _mm512_set1_epi32,
+        Avx512, __m512i, all 0xffff, truncate _mm512_cvttps_epi32, float _mm512_cvtepi32_ps, set1 _mm512_set1_epi32,
         min _mm512_min_epu32, mul _mm512_mullo_epi32, add _mm512_add_epi32,
         gather |at, index| _mm512_i32gather_ps::<4>(index, at),
         rows rows_512
     );
     wide_lookup!(
-        Avx2, "avx2", __m256i, all 0xff, truncate _mm256_cvttps_epi32, float _mm256_cvtepi32_ps, set1 _mm256_set1_epi32,
+        Avx2, __m256i, all 0xff, truncate _mm256_cvttps_epi32, float _mm256_cvtepi32_ps, set1 _mm256_set1_epi32,
         min _mm256_min_epu32, mul _mm256_mullo_epi32, add _mm256_add_epi32,
         gather |at, index| _mm256_i32gather_ps::<4>(at, index),
         rows rows_256
     );
 
-    /// Without instructions for it, lane by lane.
+    /// Without instructions for it, lane by lane. Never inlined: it is long, and for processors without AVX2 alone.
     impl Lookup for Sse2 {
         type Place = [usize; 4];
 
-        #[inline(always)]
+        #[inline(never)]
         fn place(self, rows: usize, width: usize) -> ([usize; 4], Self) {
             let mut lanes = [0.0; 4];
             self.write(&mut lanes);
             let found = lanes.map(|x| Lookup::place(x, rows, width));
             (found.map(|f| f.0), Self::from_fn(|i| found[i].1))
         }
-        #[inline(always)]
+        #[inline(never)]
         fn whole(self, most: usize) -> Self {
             let mut lanes = [0.0; 4];
             self.write(&mut lanes);
             Self::from_fn(|i| lanes[i].whole(most))
         }
-        #[inline(always)]
+        #[inline(never)]
         fn pick(table: &[f32], place: [usize; 4], column: usize) -> Self {
             Self::from_fn(|i| f32::pick(table, place[i], column))
         }

@@ -16,12 +16,22 @@ mod pair;
 
 pub use bisection::{bisected, try_bisected};
 pub use counted::{Counted, operations_of};
-pub use dual::Dual;
-pub use lookup::{Lookup, Part};
+pub use dual::{Dual, GRADIENT};
+pub use lookup::Lookup;
 pub use pair::Pair;
 
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// A part of a kernel. Implementations are `#[inline(always)]`, so that they are compiled for the instruction set of the function that
+/// they stand in.
+pub trait Part {
+    /// What it yields.
+    type Output;
+
+    /// Does it.
+    fn run(self) -> Self::Output;
+}
 
 /// A real number, or a pack of them, that the physics can be evaluated in.
 ///
@@ -78,6 +88,13 @@ pub trait Real:
     fn splat_mask(truth: bool) -> Self::Mask;
     /// `if_true` where the mask holds, else `if_false`.
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
+
+    /// Does a part of a kernel in a function of its own, which has the instruction set of the scalar. All else of a kernel becomes one
+    /// function, and the time that a compiler takes grows faster than a function's length.
+    #[inline(never)]
+    fn apart<P: Part>(part: P) -> P::Output {
+        part.run()
+    }
 
     /// Minus one below zero, else plus one: `sgn(0) = +1`, as the Magic Formula wants.
     #[inline(always)]

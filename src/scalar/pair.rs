@@ -2,8 +2,9 @@
 //! long chains of operations that wait for each other, and a processor looks only so far ahead for something else to
 //! do.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::Real;
-use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// Two scalars as one: every operation is done for both. Also the truths of both.
@@ -39,10 +40,26 @@ impl<R: Not<Output = R>> Not for Pair<R> {
     }
 }
 
+// Loops and not the library's functions of arrays: for those lanes would leave their instruction set.
+
+/// The first and the second scalars of pairs.
+#[inline(always)]
+fn halves<R: Real, const N: usize>(x: [Pair<R>; N]) -> [[R; N]; 2] {
+    let mut halves = [[R::lit(0.0); N]; 2];
+    for i in 0..N {
+        (halves[0][i], halves[1][i]) = (x[i].0, x[i].1);
+    }
+    halves
+}
+
 /// Pairs of the first and the second scalars.
 #[inline(always)]
-fn join<R: Copy, const N: usize>(first: [R; N], second: [R; N]) -> [Pair<R>; N] {
-    from_fn(|i| Pair(first[i], second[i]))
+fn join<R: Real, const N: usize>(first: [R; N], second: [R; N]) -> [Pair<R>; N] {
+    let mut pairs = [Pair::lit(0.0); N];
+    for i in 0..N {
+        pairs[i] = Pair(first[i], second[i]);
+    }
+    pairs
 }
 
 impl<R: Real> Real for Pair<R> {
@@ -126,18 +143,22 @@ impl<R: Real> Real for Pair<R> {
     }
     #[inline(always)]
     fn tan_each<const N: usize>(x: [Self; N]) -> [Self; N] {
-        join(R::tan_each(x.map(|x| x.0)), R::tan_each(x.map(|x| x.1)))
+        let [first, second] = halves(x);
+        join(R::tan_each(first), R::tan_each(second))
     }
     #[inline(always)]
     fn atan_each<const N: usize>(x: [Self; N]) -> [Self; N] {
-        join(R::atan_each(x.map(|x| x.0)), R::atan_each(x.map(|x| x.1)))
+        let [first, second] = halves(x);
+        join(R::atan_each(first), R::atan_each(second))
     }
     #[inline(always)]
     fn sin_pi_each<const N: usize>(x: [Self; N]) -> [Self; N] {
-        join(R::sin_pi_each(x.map(|x| x.0)), R::sin_pi_each(x.map(|x| x.1)))
+        let [first, second] = halves(x);
+        join(R::sin_pi_each(first), R::sin_pi_each(second))
     }
     #[inline(always)]
     fn cos_pi_each<const N: usize>(x: [Self; N]) -> [Self; N] {
-        join(R::cos_pi_each(x.map(|x| x.0)), R::cos_pi_each(x.map(|x| x.1)))
+        let [first, second] = halves(x);
+        join(R::cos_pi_each(first), R::cos_pi_each(second))
     }
 }

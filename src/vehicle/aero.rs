@@ -1,6 +1,8 @@
 //! Drag and downforce with centre of pressure, headwind and DRS (the book, chapter Model,
 //! section 2).
 
+#![deny(clippy::disallowed_methods)]
+
 use super::chassis::Chassis;
 use crate::scalar::Real;
 

@@ -155,7 +155,7 @@ impl Car {
         let root = document.root();
         let chassis_table = root.required_table("chassis")?;
         let flat = read_parameters(&chassis_table, Chassis::<f64>::PARAMETERS)?;
-        let chassis = Chassis::from_flat(|i| flat[i]);
+        let chassis = Chassis::from_flat(&flat);
         if chassis.drs_lift / 100.0 > 1.0 - chassis.pressure_centre {
             return Err(chassis_table.refuse(
                 "drs_downforce_percent",
@@ -317,11 +317,11 @@ impl Car {
         let flat = self.to_flat();
         match self.tyre_model() {
             TyreModel::MagicFormula => {
-                let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(|slot| flat[slot]);
+                let car = CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat);
                 car.tyres.map(|tyre| AxleTyre::MagicFormula(Box::new(tyre), 1.0))
             }
             TyreModel::Linear => {
-                let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(|slot| flat[slot]);
+                let car = CarModel::<f64, LinearTyre<f64>>::from_parameters(&flat);
                 car.tyres.map(AxleTyre::Linear)
             }
         }
@@ -342,18 +342,18 @@ impl Car {
     pub fn with_flat(&self, flat: &[f64]) -> Self {
         let chassis_count = Chassis::<f64>::PARAMETERS.len();
         let tyre_count = self.tyre_model().parameters().len();
-        let front_at = |i: usize| flat[chassis_count + i];
-        let rear_at = |i: usize| flat[chassis_count + tyre_count + i];
+        let (chassis, tyres) = flat.split_at(chassis_count);
+        let (front_flat, rear_flat) = tyres.split_at(tyre_count);
         let mut car = self.clone();
-        car.chassis = Chassis::from_flat(|i| flat[i]);
+        car.chassis = Chassis::from_flat(chassis);
         match &mut car.tyres {
             Tyres::MagicFormula { front, rear } => {
-                front.coefficients = TyreCoefficients::from_flat(front_at);
-                rear.coefficients = TyreCoefficients::from_flat(rear_at);
+                front.coefficients = TyreCoefficients::from_flat(front_flat);
+                rear.coefficients = TyreCoefficients::from_flat(rear_flat);
             }
             Tyres::Linear { front, rear } => {
-                *front = LinearTyre::from_flat(front_at);
-                *rear = LinearTyre::from_flat(rear_at);
+                *front = LinearTyre::from_flat(front_flat);
+                *rear = LinearTyre::from_flat(rear_flat);
             }
         }
         car
@@ -472,7 +472,7 @@ fn read_tyres(table: &Table<'_>, tyre: impl Fn(&str) -> Result<TyreFile>) -> Res
         let axle_table = table.required_table(axle)?;
         let flat = read_parameters(&axle_table, LinearTyre::<f64>::PARAMETERS)?;
         axle_table.finish()?;
-        Ok(LinearTyre::from_flat(|i| flat[i]))
+        Ok(LinearTyre::from_flat(&flat))
     };
     match (table.string("front"), table.string("rear")) {
         (Ok(Some(front)), Ok(Some(rear))) => Ok(Tyres::MagicFormula {

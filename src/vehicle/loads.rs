@@ -1,6 +1,8 @@
 //! Vertical wheel loads: static, aerodynamic, roll and longitudinal transfer (the book, chapter
 //! Model, section 2; the thesis's (3.20)-(3.23) without longitudinal transfer).
 
+#![deny(clippy::disallowed_methods)]
+
 use super::aero::AeroForces;
 use super::chassis::{BodyState, Chassis};
 use crate::scalar::Real;

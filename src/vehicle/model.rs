@@ -1,11 +1,13 @@
 //! The whole car: wheels, tyres, aero, loads and body put together, and one Runge-Kutta step of it
 //! (the book, chapter Model, section 2). Twin of `shaders/car.wgsl`.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::aero::aero_forces;
 use super::chassis::{BodyForces, BodyState, Chassis, body_derivative};
 use super::loads::wheel_loads;
 use super::tyre::{Tyre, TyreForces, TyreInput};
-use crate::scalar::Real;
+use crate::scalar::{Part, Real};
 
 /// What drives the car: the logged inputs.
 #[derive(Clone, Copy, Debug)]
@@ -128,31 +130,36 @@ pub fn to_body_axes<R: Real>(forces: &TyreForces<R>, (cos, sin): (R, R)) -> (R, 
 }
 
 impl<R: Real, T: Tyre<R>> CarModel<R, T> {
-    /// Makes a car ready from its flat form ([`super::Car::to_flat`]), `at(i)` being the `i`-th parameter.
+    /// Makes a car ready from its flat form ([`super::Car::to_flat`]).
     ///
     /// Negative camber leans the tops inwards: the left wheels then lean to the right, which is a positive
     /// inclination about the forward axis.
-    pub fn from_parameters(mut at: impl FnMut(usize) -> R) -> Self {
-        let chassis = Chassis::from_flat(&mut at);
+    ///
+    /// # Panics
+    /// If it is shorter than that.
+    pub fn from_parameters(flat: &[R]) -> Self {
+        let chassis = Chassis::from_flat(flat);
         let (front, rear) = (Chassis::<R>::PARAMETERS.len(), T::MODEL.parameters().len());
         let degree = R::lit(std::f64::consts::PI / 180.0);
         Self {
             tyres: [
-                T::from_parameters(|i| at(front + i), -(chassis.camber_front * degree)),
-                T::from_parameters(|i| at(front + rear + i), -(chassis.camber_rear * degree)),
+                T::from_parameters(&flat[front..], -(chassis.camber_front * degree)),
+                T::from_parameters(&flat[front + rear..], -(chassis.camber_rear * degree)),
             ],
             chassis,
         }
     }
 
     /// From the table that [`CarModel::to_table`] gives.
-    #[inline(always)]
-    pub fn from_table(mut at: impl FnMut(usize) -> R) -> Self {
+    ///
+    /// # Panics
+    /// If it is shorter than that.
+    pub fn from_table(table: &[R]) -> Self {
         let front = Chassis::<R>::PARAMETERS.len();
         let rear = front + T::FIELDS.len();
         Self {
-            chassis: Chassis::from_flat(&mut at),
-            tyres: [T::from_flat(|i| at(front + i)), T::from_flat(|i| at(rear + i))],
+            chassis: Chassis::from_flat(table),
+            tyres: [T::from_flat(&table[front..]), T::from_flat(&table[rear..])],
         }
     }
 
@@ -169,7 +176,28 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
     /// The rate of change of `state` under `input`.
     #[inline(always)]
     pub fn rate(&self, state: &CarState<R>, input: &CarInput<R>) -> CarRate<R> {
-        let chassis = &self.chassis;
+        R::apart(Rate {
+            car: self,
+            state,
+            input,
+        })
+    }
+}
+
+/// What [`CarModel::rate`] works on: the longest part of the kernels that drive, which share one copy of it.
+struct Rate<'a, R, T> {
+    car: &'a CarModel<R, T>,
+    state: &'a CarState<R>,
+    input: &'a CarInput<R>,
+}
+
+impl<R: Real, T: Tyre<R>> Part for Rate<'_, R, T> {
+    type Output = CarRate<R>;
+
+    #[inline(always)]
+    fn run(self) -> CarRate<R> {
+        let Self { car, state, input } = self;
+        let chassis = &car.chassis;
         let body = &state.body;
         let aero = aero_forces(chassis, body.vx, input.flap);
         let loads = wheel_loads(chassis, body, state.pitch_acceleration, &aero);
@@ -206,7 +234,7 @@ impl<R: Real, T: Tyre<R>> CarModel<R, T> {
                     side,
                 };
             }
-            let forces = self.tyres[axle].axle_forces_on(inputs, input.friction);
+            let forces = car.tyres[axle].axle_forces_on(inputs, input.friction);
             // The rear axle comes last, and its wheels do not steer.
             rear_force = forces[0].x + forces[1].x;
             for half in 0..2 {

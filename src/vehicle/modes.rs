@@ -126,7 +126,7 @@ fn linearised(flat: &[f64], tyre: TyreModel, speed: f64, wheels: Wheels) -> Opti
 
 /// As [`linearised`], with tyres of this model.
 fn linearised_on<T: Tyre<f64>>(flat: &[f64], speed: f64, wheels: Wheels) -> Option<(Linearised, f64)> {
-    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let car = CarModel::<f64, T>::from_parameters(flat);
     let state = |x: [f64; 6]| CarState {
         body: BodyState {
             vx: x[0],

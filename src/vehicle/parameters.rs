@@ -52,12 +52,14 @@ macro_rules! parameters {
         }
 
         impl<R: Copy> $name<R> {
-            /// From the flat form, `at(i)` being the `i`-th parameter of the table.
-            #[inline(always)]
-            pub fn from_flat(mut at: impl FnMut(usize) -> R) -> Self {
+            /// From the flat form, in the order of the table.
+            ///
+            /// # Panics
+            /// If it is shorter than the table.
+            pub fn from_flat(flat: &[R]) -> Self {
+                let flat = &flat[..Self::FIELDS.len()];
                 let mut next = 0..;
-                $(let $field = at(next.next().unwrap_or(0));)*
-                Self { $($field),* }
+                Self { $($field: flat[next.next().unwrap_or(0)]),* }
             }
 
             /// To the flat form, in the order of the table.
@@ -85,12 +87,14 @@ macro_rules! fields {
         }
 
         impl<R: Copy> $name<R> {
-            /// From the flat form, `at(i)` being the `i`-th figure.
-            #[inline(always)]
-            pub fn from_flat(mut at: impl FnMut(usize) -> R) -> Self {
+            /// From the flat form, in the order of [`Self::FIELDS`].
+            ///
+            /// # Panics
+            /// If it is shorter than that.
+            pub fn from_flat(flat: &[R]) -> Self {
+                let flat = &flat[..Self::FIELDS.len()];
                 let mut next = 0..;
-                $(let $field = at(next.next().unwrap_or(0));)*
-                Self { $($field),* }
+                Self { $($field: flat[next.next().unwrap_or(0)]),* }
             }
 
             /// Every figure put through `f`.

@@ -18,7 +18,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// Unknowns of a trim.
 const UNKNOWNS: usize = 5;
-type Exact = Dual<UNKNOWNS>;
+type Exact = Dual;
 type Point = SVector<f64, UNKNOWNS>;
 
 /// The car in steady cornering.
@@ -178,9 +178,10 @@ const PAST_THE_PEAK: f64 = 0.85;
 impl<T: Tyre<f64>, D: Tyre<Exact>> Ready<T, D> {
     fn new(car: &Car) -> Self {
         let flat = car.to_flat();
+        let duals: Vec<Exact> = flat.iter().copied().map(Exact::constant).collect();
         Self {
-            plain: CarModel::from_parameters(|slot| flat[slot]),
-            exact: CarModel::from_parameters(|slot| Exact::constant(flat[slot])),
+            plain: CarModel::from_parameters(&flat),
+            exact: CarModel::from_parameters(&duals),
         }
     }
 

@@ -61,12 +61,12 @@ pub fn moments_under(
     let flat = car.to_flat();
     match car.tyre_model() {
         TyreModel::MagicFormula => at(
-            &CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]),
+            &CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat),
             driven,
             loads_mps2,
         ),
         TyreModel::Linear => at(
-            &CarModel::<f64, LinearTyre<f64>>::from_parameters(|i| flat[i]),
+            &CarModel::<f64, LinearTyre<f64>>::from_parameters(&flat),
             driven,
             loads_mps2,
         ),
@@ -146,7 +146,7 @@ mod tests {
         let mut car = Car::load("gt").unwrap();
         (car.chassis.drs_drag, car.chassis.drs_lift) = (20.0, 30.0);
         let flat = car.to_flat();
-        let model = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]);
+        let model = CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat);
         let state = CarState {
             body: BodyState {
                 vx: 40.0,

@@ -59,7 +59,7 @@ fn errors<R: Real<Mask = bool, Storage = R> + Into<f64>, T: Tyre<R>>(
 /// The `f32` scalar, window by window, as the lanes do it.
 fn scalar(replay: &ReplayProblem, population: &[f64]) -> Evaluation {
     fn single<T: Tyre<f32>>(replay: &ReplayProblem, plan: &Plan<f32>, figures: &[f32]) -> Option<[f64; 4]> {
-        errors(replay, plan, &CarModel::<f32, T>::from_table(|i| figures[i]))
+        errors(replay, plan, &CarModel::<f32, T>::from_table(figures))
     }
     let table = ModelTable::new(&replay.free, &replay.problem.variables);
     let plan = replay.plan.to_f32();
@@ -93,7 +93,7 @@ fn figures(replay: &ReplayProblem, table: &ModelTable, candidate: &[f64]) -> Vec
 fn scalar_trace(replay: &ReplayProblem, candidate: &[f64]) -> Vec<[f32; 4]> {
     fn go<T: Tyre<f32>>(replay: &ReplayProblem, figures: &[f32]) -> Vec<[f32; 4]> {
         let plan = replay.plan.to_f32();
-        let car = CarModel::<f32, T>::from_table(|i| figures[i]);
+        let car = CarModel::<f32, T>::from_table(figures);
         let mut outputs = Vec::new();
         drive_window(&car, &plan, &plan.windows[0], |_, output| outputs.push(output));
         outputs
@@ -211,7 +211,7 @@ fn report(replay: &ReplayProblem, backend: &str, candidate: &[f64]) -> String {
 /// the edge of a spin, and neither answer is wrong.
 fn neighbours(replay: &ReplayProblem, candidate: &[f64]) -> Evaluation {
     fn near<T: Tyre<f64>>(replay: &ReplayProblem, flat: &[f64]) -> Option<[f64; 4]> {
-        let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+        let car = CarModel::<f64, T>::from_parameters(flat);
         errors(replay, &replay.plan, &car)
     }
     let mut random = Random(99);

@@ -203,7 +203,7 @@ fn a_rolling_car_gives_speed_for_height() {
     car.chassis.drag_area = 0.0;
     let gravity = car.chassis.gravity;
     let flat = car.to_flat();
-    let model = CarModel::<f64, lapswarm::vehicle::MagicFormula<f64>>::from_parameters(|i| flat[i]);
+    let model = CarModel::<f64, lapswarm::vehicle::MagicFormula<f64>>::from_parameters(&flat);
     let mut state = CarState::straight(40.0);
     let (mut height, mut length, step) = (0.0, 0.0, 1e-3);
     for _ in 0..2000 {

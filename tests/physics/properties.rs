@@ -45,7 +45,7 @@ fn parse_car(text: &str) -> Result<Car> {
 /// A chassis that `Car::parse` takes: an open DRS may not shed more than the rear axle has.
 fn chassis() -> impl Strategy<Value = Chassis<f64>> {
     flat(Chassis::<f64>::PARAMETERS).prop_map(|flat| {
-        let mut chassis = Chassis::from_flat(|i| flat[i]);
+        let mut chassis = Chassis::from_flat(&flat);
         chassis.drs_lift = chassis
             .drs_lift
             .min(100.0 * (1.0 - chassis.pressure_centre))
@@ -64,7 +64,7 @@ proptest! {
 
     #[test]
     fn a_tyre_file_comes_back_bit_for_bit(flat in flat(TYRE)) {
-        let file = TyreFile::new(TyreCoefficients::from_flat(|i| flat[i]));
+        let file = TyreFile::new(TyreCoefficients::from_flat(&flat));
         let text = file.to_text();
         let back = parse_tir(&text).unwrap();
         prop_assert_eq!(bits(&back.coefficients.to_flat()), bits(&flat));
@@ -76,7 +76,7 @@ proptest! {
     #[test]
     fn a_changed_tyre_file_keeps_its_text(flat in flat(TYRE)) {
         let mut file = parse_tir(include_str!("../../data/cars/gt_slick.tir")).unwrap();
-        file.coefficients = TyreCoefficients::from_flat(|i| flat[i]);
+        file.coefficients = TyreCoefficients::from_flat(&flat);
         let back = parse_tir(&file.to_text()).unwrap();
         prop_assert_eq!(bits(&back.coefficients.to_flat()), bits(&flat));
         prop_assert!(file.to_text().contains("! A racing slick"));
@@ -92,7 +92,7 @@ proptest! {
         ratio in 0.1..100.0,
         engine in any::<bool>(),
     ) {
-        let file = |flat: &[f64]| Box::new(parse_tir(&TyreFile::new(TyreCoefficients::from_flat(|i| flat[i])).to_text()).unwrap());
+        let file = |flat: &[f64]| Box::new(parse_tir(&TyreFile::new(TyreCoefficients::from_flat(flat)).to_text()).unwrap());
         let mut car = Car::bundled().unwrap();
         car.name = name;
         car.chassis = chassis;
@@ -113,8 +113,8 @@ proptest! {
         let mut car = Car::bundled().unwrap();
         car.chassis = chassis;
         car.tyres = Tyres::Linear {
-            front: LinearTyre::from_flat(|i| front[i]),
-            rear: LinearTyre::from_flat(|i| rear[i]),
+            front: LinearTyre::from_flat(&front),
+            rear: LinearTyre::from_flat(&rear),
         };
         written_and_read(&car)?;
     }
@@ -207,12 +207,12 @@ proptest! {
         for &index in &wild {
             flat[index] = figures[index];
         }
-        let tyre: TyreCoefficients<f64> = TyreCoefficients::from_flat(|i| flat[i]);
+        let tyre: TyreCoefficients<f64> = TyreCoefficients::from_flat(&flat);
         if tyre.well_formed().is_err() { return Ok(()); }
         let load = share * tyre.fnomin * tyre.lfz0;
         let forces = forces_at(&tyre, load, ratio, tangent, camber);
         prop_assert!(forces.x.is_finite() && forces.y.is_finite() && forces.aligning_moment.is_finite(), "{forces:?}");
-        let single: TyreCoefficients<f32> = TyreCoefficients::from_flat(|i| flat[i] as f32);
+        let single: TyreCoefficients<f32> = TyreCoefficients::from_flat(&flat.iter().map(|x| *x as f32).collect::<Vec<_>>());
         let forces = single.prepare(camber as f32).forces(TyreInput {
             load: load as f32,
             slip_ratio: ratio as f32,
@@ -287,8 +287,9 @@ proptest! {
 /// The rates of state, ax and ay of a car in the state, under the wheel speeds and steering, and with the `freed`
 /// parameter that `variables` hold in this order.
 fn rates<R: lapswarm::scalar::Real>(variables: &[R; 12], parameters: &[R], freed: usize) -> Vec<R> {
-    let at = |i: usize| if i == freed { variables[11] } else { parameters[i] };
-    let model: CarModel<R, MagicFormula<R>> = CarModel::from_parameters(at);
+    let mut parameters = parameters.to_vec();
+    parameters[freed] = variables[11];
+    let model: CarModel<R, MagicFormula<R>> = CarModel::from_parameters(&parameters);
     let state = CarState::from_array(std::array::from_fn(|i| variables[i]));
     let input = CarInput {
         wheel_speed: std::array::from_fn(|i| variables[6 + i]),

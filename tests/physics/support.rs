@@ -67,7 +67,7 @@ pub fn forces_at(
 /// A car of a chassis and the flat forms of its tyres.
 pub fn car_model<R: Real, T: Tyre<R>>(chassis: &Chassis<R>, front: &[R], rear: &[R]) -> CarModel<R, T> {
     let flat = [&chassis.to_flat()[..], front, rear].concat();
-    CarModel::from_parameters(|i| flat[i])
+    CarModel::from_parameters(&flat)
 }
 
 /// One Runge-Kutta step of a car, `input` giving the inputs at a share of the step.
@@ -92,7 +92,7 @@ pub fn chassis_from(words: &str) -> Chassis<f64> {
             .unwrap_or_else(|| panic!("no chassis key {key}"));
         flat[index] = value.parse().unwrap();
     }
-    Chassis::from_flat(|i| flat[i])
+    Chassis::from_flat(&flat)
 }
 
 /// How far from MFeval forces (N) and moment (Nm) may be.

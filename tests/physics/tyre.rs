@@ -46,7 +46,7 @@ fn every_coefficient_of_set_b_that_is_not_zero_shows_at_the_chosen_points() {
         }
         let mut wrong = flat.clone();
         wrong[index] *= 1.01;
-        let worst = worst_differences(&TyreCoefficients::from_flat(|i| wrong[i]), POINTS.into_iter());
+        let worst = worst_differences(&TyreCoefficients::from_flat(&wrong), POINTS.into_iter());
         assert!(
             worst[0] > FORCE_TOLERANCE || worst[1] > FORCE_TOLERANCE || worst[2] > MOMENT_TOLERANCE,
             "{} off by one per cent goes unnoticed: {worst:?}",
@@ -143,7 +143,8 @@ fn single_precision_agrees_with_double() {
     use lapswarm::scalar::lanes::{Lanes, Portable};
     let double = set_b();
     let flat = double.to_flat();
-    let single: TyreCoefficients<Portable> = TyreCoefficients::from_flat(|i| Portable::lit(flat[i]));
+    let single: TyreCoefficients<Portable> =
+        TyreCoefficients::from_flat(&flat.iter().map(|x| Portable::lit(*x)).collect::<Vec<_>>());
     for points in POINTS.chunks(8) {
         let lane = |column: usize| {
             Portable::from_fn(|i| {

@@ -9,6 +9,7 @@ mod examples;
 mod messages;
 mod paths;
 mod pictures;
+mod tutorials;
 
 /// A bench of a kind, run to its end.
 fn bench(kind: &str, arguments: &[&str]) -> std::process::Output {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 fn lap_on<T: Tyre<f64>>(drive: &DriveProblem, candidate: &[f64]) -> DrivenLap {
     let flat = drive.free.flat(candidate);
-    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let car = CarModel::<f64, T>::from_parameters(&flat);
     let [line, plan, share] = drive.lap_figures(candidate);
     let world = drive.world();
     let course = Course::at(world.road, line);

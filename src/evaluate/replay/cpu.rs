@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 fn errors_on<T: Tyre<f64>>(replay: &ReplayProblem, candidate: &[f64]) -> Option<[f64; CHANNELS]> {
     let flat = replay.flat(candidate);
-    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let car = CarModel::<f64, T>::from_parameters(&flat);
     let mut total = [0.0; CHANNELS];
     for window in &replay.plan.windows {
         let score = score_window(&car, &replay.plan, window);
@@ -53,7 +53,7 @@ impl Visit<f64> for &mut Traced {
 /// `window` as a car in flat form drives it: from sample to sample as [`drive_window`] has it, in `f64`.
 pub fn trace(flat: &[f64], model: TyreModel, plan: &Plan<f64>, window: &Window<f64>) -> Traced {
     fn go<T: Tyre<f64>>(flat: &[f64], plan: &Plan<f64>, window: &Window<f64>) -> Traced {
-        let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+        let car = CarModel::<f64, T>::from_parameters(flat);
         let samples = window.end - window.start;
         let mut traced = Traced {
             outputs: Vec::with_capacity(samples),
@@ -83,7 +83,7 @@ impl ReplayProblem {
 }
 
 fn chained<T: Tyre<f64>>(plan: &mut Plan<f64>, flat: &[f64]) {
-    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let car = CarModel::<f64, T>::from_parameters(flat);
     let mut before: Option<Window<f64>> = None;
     for k in 0..plan.windows.len() {
         let window = plan.windows[k];

@@ -3,13 +3,10 @@
 use super::kernel::{CHANNELS, drive_window};
 use super::plan::Window;
 use super::problem::ReplayProblem;
-use crate::scalar::Dual;
+use crate::scalar::{Dual, GRADIENT};
 use crate::vehicle::tyre::Tyre;
 use crate::vehicle::{CarModel, LinearTyre, MagicFormula, TyreModel};
 use rayon::prelude::*;
-
-/// Parameters that are differentiated to in one drive: as many doubles as the widest register holds.
-const CHUNK: usize = 8;
 
 /// Errors of the outputs, and their derivatives.
 #[derive(Clone, Debug)]
@@ -21,29 +18,30 @@ pub struct Residuals {
 }
 
 /// Errors by scored sample and channel, each with its derivatives.
-type Duals = Vec<Dual<CHUNK>>;
+type Duals = Vec<Dual>;
 
-/// A drive through a window with the derivatives to `CHUNK` parameters from `first`; `None` if the car is lost.
-#[inline(always)]
-fn drive_chunk<T: Tyre<Dual<CHUNK>>>(
+/// A drive through a window with the derivatives to `GRADIENT` parameters from `first`; `None` if the car is lost.
+fn drive_chunk<T: Tyre<Dual>>(
     replay: &ReplayProblem,
     candidate: &[f64],
     first: usize,
     window: &Window<f64>,
 ) -> Option<Duals> {
     let variable = |i: usize| match i.checked_sub(first) {
-        Some(k) if k < CHUNK => Dual::variable(candidate[i], k),
+        Some(k) if k < GRADIENT => Dual::variable(candidate[i], k),
         _ => Dual::constant(candidate[i]),
     };
-    let car = CarModel::<Dual<CHUNK>, T>::from_parameters(|slot| {
-        replay.free.sources()[slot].map_or(Dual::constant(replay.free.base()[slot]), variable)
-    });
+    let slots = replay.free.base().iter().zip(replay.free.sources());
+    let flat: Vec<Dual> = slots
+        .map(|(base, source)| source.map_or(Dual::constant(*base), variable))
+        .collect();
+    let car = CarModel::<Dual, T>::from_parameters(&flat);
     let mut errors = Vec::with_capacity((window.end - window.start - window.scored_from) * CHANNELS);
     let (drives, _) = drive_window(
         &car,
         &replay.plan,
         window,
-        |i: usize, outputs: [Dual<CHUNK>; CHANNELS]| {
+        |i: usize, outputs: [Dual; CHANNELS]| {
             if i >= window.scored_from {
                 let measured = &replay.plan.samples[window.start + i].measured;
                 errors.extend((0..CHANNELS).map(|k| outputs[k] - Dual::constant(measured[k])));
@@ -51,46 +49,6 @@ fn drive_chunk<T: Tyre<Dual<CHUNK>>>(
         },
     );
     drives.then_some(errors)
-}
-
-/// [`drive_chunk`] compiled for what the processor has: the gradients are arrays that fill its registers.
-fn drive_dispatched(
-    replay: &ReplayProblem,
-    candidate: &[f64],
-    first: usize,
-    window: &Window<f64>,
-) -> Option<Duals> {
-    #[inline(always)]
-    fn by_model(
-        replay: &ReplayProblem,
-        candidate: &[f64],
-        first: usize,
-        window: &Window<f64>,
-    ) -> Option<Duals> {
-        match replay.tyre_model() {
-            TyreModel::MagicFormula => {
-                drive_chunk::<MagicFormula<Dual<CHUNK>>>(replay, candidate, first, window)
-            }
-            TyreModel::Linear => drive_chunk::<LinearTyre<Dual<CHUNK>>>(replay, candidate, first, window),
-        }
-    }
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn with_avx2(
-            replay: &ReplayProblem,
-            candidate: &[f64],
-            first: usize,
-            window: &Window<f64>,
-        ) -> Option<Duals> {
-            by_model(replay, candidate, first, window)
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has the set, as just detected.
-            return unsafe { with_avx2(replay, candidate, first, window) };
-        }
-    }
-    by_model(replay, candidate, first, window)
 }
 
 impl ReplayProblem {
@@ -101,19 +59,23 @@ impl ReplayProblem {
             return None;
         }
         let windows = &self.plan.windows;
-        let starts = (0..self.dimensions().max(1)).step_by(CHUNK);
+        let starts = (0..self.dimensions().max(1)).step_by(GRADIENT);
         let drives: Vec<(usize, &Window<f64>)> = starts
             .flat_map(|first| windows.iter().map(move |window| (first, window)))
             .collect();
+        let chunk = match self.tyre_model() {
+            TyreModel::MagicFormula => drive_chunk::<MagicFormula<Dual>>,
+            TyreModel::Linear => drive_chunk::<LinearTyre<Dual>>,
+        };
         let driven: Vec<Duals> = drives
             .par_iter()
-            .map(|&(first, window)| drive_dispatched(self, candidate, first, window))
+            .map(|&(first, window)| chunk(self, candidate, first, window))
             .collect::<Option<_>>()?;
         let chunks: Vec<&[Duals]> = driven.chunks(windows.len().max(1)).collect();
         let errors: Vec<f64> = chunks.first()?.iter().flatten().map(|e| e.value).collect();
         let column = |i: usize| -> Vec<f64> {
-            let chunk = chunks[i / CHUNK].iter().flatten();
-            chunk.map(|e| e.gradient[i % CHUNK]).collect()
+            let chunk = chunks[i / GRADIENT].iter().flatten();
+            chunk.map(|e| e.gradient[i % GRADIENT]).collect()
         };
         let columns: Vec<Vec<f64>> = (0..self.dimensions()).map(column).collect();
         let finite = |column: &Vec<f64>| column.iter().all(|x| x.is_finite());

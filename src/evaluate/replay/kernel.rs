@@ -1,6 +1,8 @@
 //! The replay kernel: drive a candidate car by the logged inputs and score what it does against what was logged.
 //! Twin of `shaders/replay.wgsl`.
 
+#![deny(clippy::disallowed_methods)]
+
 pub use super::plan::CHANNELS;
 use super::plan::{Norm, Plan, Sample, Window};
 use crate::scalar::Real;
@@ -12,14 +14,23 @@ use crate::vehicle::{CarInput, CarModel, CarState};
 /// losing their tails: the error grows with the number of terms in each level, not with their product.
 pub const BLOCK: usize = 64;
 
+/// A share `fraction` of the way from `a` to `b`.
+#[inline(always)]
+fn mix<R: Real>(fraction: R, a: R::Storage, b: R::Storage) -> R {
+    R::load(a) + fraction * (R::load(b) - R::load(a))
+}
+
 /// The inputs a share `fraction` of the way from one sample to the next, linear between samples.
 #[inline(always)]
 fn input_between<R: Real>(from: &Sample<R::Storage>, to: &Sample<R::Storage>, fraction: R) -> CarInput<R> {
-    let mix = |a: R::Storage, b: R::Storage| R::load(a) + fraction * (R::load(b) - R::load(a));
+    let mut wheel_speed = [R::lit(0.0); 4];
+    for (i, speed) in wheel_speed.iter_mut().enumerate() {
+        *speed = mix(fraction, from.wheel_speed[i], to.wheel_speed[i]);
+    }
     CarInput {
-        wheel_speed: std::array::from_fn(|i| mix(from.wheel_speed[i], to.wheel_speed[i])),
-        steer: mix(from.steer, to.steer),
-        flap: mix(from.flap, to.flap),
+        wheel_speed,
+        steer: mix(fraction, from.steer, to.steer),
+        flap: mix(fraction, from.flap, to.flap),
         friction: None,
     }
 }
@@ -48,7 +59,11 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
     window: &Window<R::Storage>,
     mut visitor: impl Visit<R>,
 ) -> (R::Mask, CarState<R>) {
-    let mut state = CarState::from_array(window.initial.map(R::load));
+    let mut figures = [R::lit(0.0); 6];
+    for (figure, initial) in figures.iter_mut().zip(window.initial) {
+        *figure = R::load(initial);
+    }
+    let mut state = CarState::from_array(figures);
     let mut drives = R::splat_mask(true);
     let step = R::load(plan.step);
     let samples = &plan.samples[window.start..window.end];
@@ -68,7 +83,11 @@ pub fn drive_window<R: Real, T: Tyre<R>>(
             );
             drives = drives & next.drives();
             let (kept, moved) = (state.to_array(), next.to_array());
-            state = CarState::from_array(std::array::from_fn(|k| R::select(drives, moved[k], kept[k])));
+            let mut figures = kept;
+            for k in 0..figures.len() {
+                figures[k] = R::select(drives, moved[k], kept[k]);
+            }
+            state = CarState::from_array(figures);
         }
     }
     let last = &samples[samples.len() - 1];

@@ -30,7 +30,7 @@ impl ReplayProblem {
 
 fn starts<T: Tyre<f64>>(replay: &ReplayProblem, flat: &[f64]) -> Vec<[f64; 6]> {
     let plan = &replay.plan;
-    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let car = CarModel::<f64, T>::from_parameters(flat);
     let reach = (RUN_AHEAD_S / replay.interval_s).round() as usize;
     let start = |window: &Window<f64>| {
         let logged = initial_state(&plan.samples[window.start]);

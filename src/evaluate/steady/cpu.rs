@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 fn settle_on<T: Tyre<f64>>(steady: &SteadyProblem, candidate: &[f64]) -> Settling<f64> {
     let flat = steady.free.flat(candidate);
-    let car = CarModel::<f64, T>::from_parameters(|i| flat[i]);
+    let car = CarModel::<f64, T>::from_parameters(&flat);
     let [speed, steer] = steady.aim_figures(candidate);
     settle(&car, steady.plan(), &Aim { speed, steer })
 }

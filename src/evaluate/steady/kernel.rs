@@ -4,6 +4,8 @@
 //! Where nothing changes any more, the car is in a trim as [`crate::vehicle::steady`] defines it: sideways, yaw, roll and
 //! pitch accelerations are zero, and the tyres do not push along the path.
 
+#![deny(clippy::disallowed_methods)]
+
 use crate::scalar::Real;
 use crate::vehicle::aero::aero_forces;
 use crate::vehicle::chassis::BodyState;
@@ -120,6 +122,7 @@ impl<R: Real> Settling<R> {
 
 impl<S: Copy + Into<f64>> Settling<S> {
     /// In double precision.
+    #[allow(clippy::disallowed_methods, reason = "no part of a kernel")]
     pub fn widened(self) -> Settling<f64> {
         Settling {
             figures: self.figures.map(Into::into),

@@ -11,7 +11,7 @@ use nalgebra::SMatrix;
 
 /// Derivatives of the rates of change to the figures that change.
 pub type Slopes = SMatrix<f64, INTEGRATED, INTEGRATED>;
-type Exact = Dual<INTEGRATED>;
+type Exact = Dual;
 
 /// The slopes of a car in flat form at a path speed (m/s), under a steering angle (rad), where its figures are these.
 pub fn slopes(
@@ -32,7 +32,8 @@ fn slopes_on<T: Tyre<Exact>>(
     (speed, steer): (f64, f64),
     figures: [f64; INTEGRATED],
 ) -> Slopes {
-    let car = CarModel::<Exact, T>::from_parameters(|slot| Exact::constant(flat[slot]));
+    let flat: Vec<Exact> = flat.iter().copied().map(Exact::constant).collect();
+    let car = CarModel::<Exact, T>::from_parameters(&flat);
     let variables = std::array::from_fn(|i| Exact::variable(figures[i], i));
     let [gain, speed, steer] = [gain, speed, steer].map(Exact::constant);
     let rate = settle_rate(&car, gain, speed, steer, variables);

@@ -171,7 +171,7 @@ impl SteadyProblem {
     /// nothing holds the car in that trim.
     pub fn left_open(&self, candidate: &[f64], figures: [f64; INTEGRATED]) -> Option<f64> {
         let flat = self.free.flat(candidate);
-        let c = Chassis::from_flat(|slot| flat[slot]);
+        let c = Chassis::from_flat(&flat);
         let [speed, steer] = self.aim_figures(candidate);
         let gain = self.plan.gain;
         // The rates of change of figures, each as great as the residual lets it be.

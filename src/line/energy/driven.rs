@@ -4,7 +4,6 @@ use super::EnergyCar;
 use super::figures::{EnergyLap, SegmentEnergy};
 use super::kernel::{Along, Car, State};
 use super::plan::{EnergyPlan, Gates, Mode};
-use crate::line::kernel::look_up;
 use crate::scalar::Lookup;
 
 /// Where the motor works on a closed lap, by station: the share of its greatest force from each station to the next.
@@ -85,12 +84,10 @@ impl EnergyCar {
     pub fn greatest_mps2(&self, speed_mps: f64) -> [f64; 4] {
         let table = &self.table;
         let square = speed_mps * speed_mps;
-        let (place, beyond) = (square * table.rows_per_speed_squared).place(table.forces.len() / 8, 8);
-        let row = f64::pick_row(&table.forces, place);
-        let [engine, motor, generator] =
-            std::array::from_fn(|column: usize| row[column] + beyond * row[4 + column]);
+        let argument = square * table.rows_per_speed_squared;
+        let [engine, motor, generator, _] = argument.between_rows(&table.forces);
         let assist = if table.assists && square < table.exhaust_from {
-            table.rotating * look_up(&table.boosts, 8, place, beyond, 3)
+            table.rotating * argument.between_rows(&table.boosts)[3]
         } else {
             0.0
         };

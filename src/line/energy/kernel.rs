@@ -11,8 +11,10 @@
 //! After R. Lot and S. A. Evangelou, *Lap time optimization of a sports series hybrid electric vehicle*, World Congress on
 //! Engineering 2013, for the energies that are accounted.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::super::ground::Ground;
-use super::super::kernel::{driving_with_drs, look_up, may_open};
+use super::super::kernel::{driving_with_drs, may_open};
 use super::super::point_mass::EnvelopeTable;
 use super::figures::SegmentEnergy;
 use super::plan::{EnergyPlan, GATES, Mode, ZoneRow};
@@ -192,18 +194,15 @@ impl<R: Lookup> Car<'_, R> {
         let [traction, drive, drag, _] = self.driving_at(here, from, bends[0]);
         let alone = bends[0].uphill(traction.min(drive) - drag);
         let ahead = (from + length * alone).max(zero);
-        let rows = self.table.boosts.len() / 8;
-        let (place, beyond) = (ahead * R::load(self.table.rows_per_speed_squared)).place(rows, 8);
-        let [motor, room, exhaust] =
-            [0, 1, 2].map(|column| look_up(&self.table.boosts, 8, place, beyond, column));
+        let argument = ahead * R::load(self.table.rows_per_speed_squared);
+        let [motor, room, exhaust, beside] = argument.between_rows(&self.table.boosts);
         let greatest = (motor * self.strategy[5]).min(room);
         let open = self.open(bends[0].bend(), from) & self.strategy[2].less_than(alone);
         let share = zone_share(&self.plan.zones[here], self.strategy);
         let reach = self.boost(left, inverse);
         let gain = if self.table.assists {
             let slow = from.less_than(R::load(self.table.exhaust_from));
-            let gain = look_up(&self.table.boosts, 8, place, beyond, 3);
-            gated(slow, gain.min(room - greatest))
+            gated(slow, beside.min(room - greatest))
         } else {
             zero
         };
@@ -327,17 +326,15 @@ impl<R: Lookup> Car<'_, R> {
         state.change = state.change - deployed;
         if self.plan.counts_charge {
             let mean = R::lit(0.5) * (from + step.end);
-            let rows = table.forces.len() / 8;
-            let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
-            let row = R::pick_row(&table.forces, place);
+            let argument = mean * R::load(table.rows_per_speed_squared);
+            let [_, _, generator_most, level] = argument.between_rows(&table.forces);
             let inverse = R::lit(1.0) / length;
-            let level = row[3] + beyond * row[7];
             let ground = bends[0].half_way(bends[1]);
             let [drag, _, lost] = self.resistance(here, mean, ground, level);
             let force = rotating * (R::lit(0.5) * (step.end - from) * inverse) + drag + lost + ground.climb();
             let unharvested = (R::load(table.harvest_most) - state.harvested_k).min(space);
             let room = (unharvested * R::load(table.force_per_harvested) * inverse).max(zero);
-            let most = (row[2] + beyond * row[6]) * self.strategy[5];
+            let most = generator_most * self.strategy[5];
             let generator = (-force).max(zero).min(most).min(room);
             let harvested_k = joules * generator * R::load(table.harvest_gain);
             state.change = state.change + harvested_k;
@@ -377,11 +374,8 @@ impl<R: Lookup> Car<'_, R> {
         };
         let end = step.end;
         let mean = R::lit(0.5) * (from + end);
-        let rows = table.forces.len() / 8;
-        let (place, beyond) = (mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
-        let row = R::pick_row(&table.forces, place);
-        let [greatest, motor_most, generator_most, level]: [R; 4] =
-            std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
+        let argument = mean * R::load(table.rows_per_speed_squared);
+        let [greatest, motor_most, generator_most, level] = argument.between_rows(&table.forces);
         let inverse = R::lit(1.0) / length;
         let ax = R::lit(0.5) * (end - from) * inverse;
         // The force at the wheels, driving or braking.
@@ -450,10 +444,8 @@ impl<R: Lookup> Car<'_, R> {
             joules * motor * R::load(table.deploy_cost) + joules * assist * R::load(table.assist_extra);
         let harvested_k = joules * generator * R::load(table.harvest_gain);
 
-        let rows = table.flows.len() / 8;
-        let (place, beyond) = (along.mean * R::load(table.rows_per_speed_squared)).place(rows, 8);
-        let row = R::pick_row(&table.flows, place);
-        let flows: [R; 4] = std::array::from_fn(|column| row[column] + beyond * row[4 + column]);
+        let argument = along.mean * R::load(table.rows_per_speed_squared);
+        let flows = argument.between_rows(&table.flows);
         // The MGU-H generates by the flow of the exhaust, while the store has space and the engine power to spare for it. The
         // engine then burns for its load at the wheels and for this.
         let cost = R::load(table.exhaust_cost);

@@ -6,6 +6,8 @@
 //! the start line. The car must cross it at the speed with which it ends the lap, so a closed lap is driven twice: once to find
 //! that speed and once for the accounts. The passes are those of [`super::super::kernel`].
 
+#![deny(clippy::disallowed_methods)]
+
 use super::super::ground::{Grounds, LevelRoad, SlopedRoad};
 use super::super::kernel::{BLOCK, Course, braked, corner, steered_corner};
 use super::super::point_mass::EnvelopeTable;
@@ -43,7 +45,7 @@ impl<R: Lookup, G: Grounds<R>> Part for Ceilings<'_, R, G> {
         let previous = |section: usize| if section > 0 { section - 1 } else { n - 1 };
         let mut next = if closed { start } else { n - 1 };
         let mut here = previous(next);
-        let [from, to] = [here, next].map(|section| G::at(course, section, section));
+        let [from, to] = [G::at(course, here, here), G::at(course, next, next)];
         speeds[next] = steered_corner(envelope, course.length[here], from, to);
         // In the first round a section is limited by its corner speed alone. On a closed line the pass continues until it meets its
         // own values.
@@ -63,7 +65,7 @@ impl<R: Lookup, G: Grounds<R>> Part for Ceilings<'_, R, G> {
             } else if !closed && here == 0 {
                 corner(envelope, G::at(course, here, here))
             } else {
-                let [from, to] = [before, here].map(|section| G::at(course, section, section));
+                let [from, to] = [G::at(course, before, before), G::at(course, here, here)];
                 steered_corner(envelope, course.length[before], from, to)
             };
             let slower = reached.less_than(most);

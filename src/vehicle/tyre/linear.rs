@@ -1,5 +1,7 @@
 //! The linear tyre: forces proportional to slip and load. Twin of `shaders/tyre_linear.wgsl`.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::{Tyre, TyreForces, TyreInput, TyreModel};
 use crate::scalar::Real;
 use crate::vehicle::parameters::parameters;
@@ -18,13 +20,12 @@ impl<R: Real> Tyre<R> for LinearTyre<R> {
     const MODEL: TyreModel = TyreModel::Linear;
     const FIELDS: &'static [&'static str] = LinearTyre::<R>::FIELDS;
 
-    fn from_parameters(at: impl FnMut(usize) -> R, _inclination: R) -> Self {
-        LinearTyre::from_flat(at)
+    fn from_parameters(flat: &[R], _inclination: R) -> Self {
+        LinearTyre::from_flat(flat)
     }
 
-    #[inline(always)]
-    fn from_flat(at: impl FnMut(usize) -> R) -> Self {
-        LinearTyre::from_flat(at)
+    fn from_flat(flat: &[R]) -> Self {
+        LinearTyre::from_flat(flat)
     }
 
     fn to_flat(&self) -> Vec<R> {

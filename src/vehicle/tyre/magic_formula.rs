@@ -1,6 +1,8 @@
 //! Magic Formula 5.2 forces and moment (Pacejka, *Tyre and Vehicle Dynamics*, ch. 4, equations 4.E1-4.E78;
 //! the book, chapter Model, section 1). Twin of `shaders/tyre.wgsl`: the same functions in the same order.
 
+#![deny(clippy::disallowed_methods)]
+
 use super::prepared::MagicFormula;
 use super::{LEAST_LOAD, Tyre, TyreCoefficients, TyreForces, TyreInput, TyreModel};
 use crate::scalar::{Pair, Real};
@@ -253,13 +255,12 @@ impl<R: Real> Tyre<R> for MagicFormula<R> {
     const FIELDS: &'static [&'static str] = MagicFormula::<R>::FIELDS;
     const MODEL: TyreModel = TyreModel::MagicFormula;
 
-    fn from_parameters(at: impl FnMut(usize) -> R, inclination: R) -> Self {
-        TyreCoefficients::from_flat(at).prepare(inclination)
+    fn from_parameters(flat: &[R], inclination: R) -> Self {
+        TyreCoefficients::from_flat(flat).prepare(inclination)
     }
 
-    #[inline(always)]
-    fn from_flat(at: impl FnMut(usize) -> R) -> Self {
-        MagicFormula::from_flat(at)
+    fn from_flat(flat: &[R]) -> Self {
+        MagicFormula::from_flat(flat)
     }
 
     fn to_flat(&self) -> Vec<R> {

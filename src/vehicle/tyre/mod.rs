@@ -69,10 +69,10 @@ pub trait Tyre<R: Real>: Copy + Send + Sync {
 
     /// Prepares the tyre for an axle whose left wheel leans to the right by `inclination` (rad). The model's parameters come in
     /// the order of [`TyreModel::parameters`].
-    fn from_parameters(at: impl FnMut(usize) -> R, inclination: R) -> Self;
+    fn from_parameters(flat: &[R], inclination: R) -> Self;
 
     /// From the figures of the prepared form.
-    fn from_flat(at: impl FnMut(usize) -> R) -> Self;
+    fn from_flat(flat: &[R]) -> Self;
 
     /// To the figures of the prepared form.
     fn to_flat(&self) -> Vec<R>;
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn friction_lowers_the_peak_and_leaves_the_stiffness() {
         let flat = Car::bundled().unwrap().to_flat();
-        let tyre = CarModel::<f64, MagicFormula<f64>>::from_parameters(|i| flat[i]).tyres[1];
+        let tyre = CarModel::<f64, MagicFormula<f64>>::from_parameters(&flat).tyres[1];
         let wheel = |along: f64, across: f64| TyreInput {
             load: 3500.0,
             slip_ratio: along,

@@ -198,7 +198,7 @@ impl TyreFile {
             })?);
         }
         Ok(Self {
-            coefficients: TyreCoefficients::from_flat(|i| flat[i]),
+            coefficients: TyreCoefficients::from_flat(&flat),
             lines,
         })
     }
