@@ -294,6 +294,16 @@ impl Worth {
         self.violation < f64::INFINITY
     }
 
+    /// The same, where violations up to `level` count as none.
+    pub fn within(self, level: f64) -> Self {
+        let violation = if self.violation <= level {
+            0.0
+        } else {
+            self.violation
+        };
+        Self { violation, ..self }
+    }
+
     /// The order from the best to the worst.
     pub fn order(&self, other: &Self) -> Ordering {
         let by_violation = self.violation.total_cmp(&other.violation);

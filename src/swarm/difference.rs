@@ -5,6 +5,10 @@
 //! particle, are redrawn now and then and kept when the move paid (Storn, Price, *Differential evolution*, J.
 //! Global Optimization 11, 1997; Brest et al., *Self-adapting control parameters in differential evolution*, IEEE
 //! TEC 10, 2006, with its constants). It explores many hollows where a swarm with one leader commits itself to one.
+//!
+//! Where little of the space is feasible, violations up to a level count as none. The level falls to zero (Takahama, Sakai,
+//! *Constrained optimization by the epsilon constrained differential evolution*, CEC 2006), so that particles move across a narrow
+//! feasible region, such as the surface of an equality, while it is still wide.
 
 use super::checkpoint::to_bytes;
 use super::motion::{Particles, Purpose, half_way_back};
@@ -68,11 +72,20 @@ pub struct DifferenceSwarm {
     particles: Particles,
     home: Vec<f64>,
     worth: Vec<Worth>,
+    best: (Vec<f64>, Worth),
+    /// The violation that counted as none at the beginning.
+    level: f64,
     /// Scale and share of coordinates of each particle, and those of its present try.
     control: Vec<[f64; 2]>,
     tried: Vec<[f64; 2]>,
     counters: Counters,
 }
+
+/// The share of the first candidates whose violations are within the first level: where so many are feasible it is zero.
+const WITHIN: f64 = 0.2;
+/// The share of the iterations at which the level has fallen to zero, and the power by which it falls.
+const FALLEN: f64 = 0.7;
+const FALL: f64 = 3.0;
 
 impl DifferenceSwarm {
     /// A swarm over the variables of `problem`.
@@ -87,6 +100,8 @@ impl DifferenceSwarm {
         Ok(Self {
             home: particles.position.clone(),
             worth: vec![Worth::FAILED; settings.population],
+            best: (particles.position[particles.row(0)].to_vec(), Worth::FAILED),
+            level: 0.0,
             control: vec![[0.5; 2]; settings.population],
             tried: vec![[0.5; 2]; settings.population],
             random,
@@ -96,16 +111,10 @@ impl DifferenceSwarm {
         })
     }
 
-    fn leader(&self) -> usize {
-        let by = |&a: &usize, &b: &usize| self.worth[a].order(&self.worth[b]);
-        (0..self.worth.len()).min_by(by).unwrap_or(0)
-    }
-
     /// The best candidate so far, in the variables' units, and what it is worth.
     pub fn best_candidate(&self) -> (Vec<f64>, Worth) {
-        let leader = self.leader();
-        let row = &self.home[self.particles.row(leader)];
-        (self.particles.space.scaled(row, 1), self.worth[leader])
+        let (position, worth) = &self.best;
+        (self.particles.space.scaled(position, 1), *worth)
     }
 
     /// Root mean square distance of the particles from their mean along an axis, as a share of the ranges.
@@ -150,6 +159,12 @@ impl DifferenceSwarm {
         }
     }
 
+    /// The violation that counts as none in this iteration.
+    fn level(&self) -> f64 {
+        let fallen = self.counters.iteration as f64 / (FALLEN * self.settings.iterations as f64);
+        self.level * (1.0 - fallen).max(0.0).powf(FALL)
+    }
+
     /// Three different particles, none of them this one.
     fn three_others(&self, particle: usize) -> [usize; 3] {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
@@ -178,8 +193,12 @@ impl AcceptsMigrants for DifferenceSwarm {
             let worst = (0..self.worth.len()).max_by(|&a, &b| self.worth[a].order(&self.worth[b]));
             if let Some(worst) = worst.filter(|&p| worth < self.worth[p]) {
                 let place = self.particles.row(worst);
-                self.home[place].copy_from_slice(&self.particles.space.position(candidate));
+                let position = self.particles.space.position(candidate);
+                self.home[place].copy_from_slice(&position);
                 self.worth[worst] = worth;
+                if worth < self.best.1 {
+                    self.best = (position, worth);
+                }
             }
         }
     }
@@ -196,12 +215,24 @@ impl Optimiser for DifferenceSwarm {
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         evaluation.check(self.settings.population, 1)?;
-        for (particle, worth) in evaluation.worths(1).into_iter().enumerate() {
-            if worth <= self.worth[particle] {
+        let worths = evaluation.worths(1);
+        if self.counters.iteration == 0 {
+            let mut violations: Vec<f64> = worths.iter().map(|worth| worth.violation).collect();
+            violations.sort_by(f64::total_cmp);
+            let within = violations[(WITHIN * violations.len() as f64) as usize];
+            self.level = if within.is_finite() { within } else { 0.0 };
+        }
+        let level = self.level();
+        for (particle, worth) in worths.into_iter().enumerate() {
+            let range = self.particles.row(particle);
+            let position = &self.particles.position[range.clone()];
+            if worth < self.best.1 {
+                self.best = (position.to_vec(), worth);
+            }
+            if worth.within(level) <= self.worth[particle].within(level) {
                 self.worth[particle] = worth;
                 self.control[particle] = self.tried[particle];
-                let range = self.particles.row(particle);
-                self.home[range.clone()].copy_from_slice(&self.particles.position[range]);
+                self.home[range].copy_from_slice(position);
             }
         }
         self.counters.told(self.settings.population);
@@ -230,6 +261,6 @@ impl Optimiser for DifferenceSwarm {
     }
 
     fn best(&self) -> Vec<f64> {
-        vec![self.worth[self.leader()].cost]
+        vec![self.best.1.cost]
     }
 }

@@ -13,8 +13,8 @@ use lapswarm::line::Parametrisation;
 tests! {
     a_fault_at_any_submission_or_allocation_costs_nothing_but_time: device full,
     lanes_take_over_from_a_device_that_keeps_failing: device full,
-    the_least_limits_change_no_bit: device,
-    portions_change_no_bit: also_device,
+    the_least_limits_change_no_bit: device full,
+    portions_change_no_bit: also_device full,
     no_number_that_is_none_gets_through: also_device,
 }
 

@@ -22,7 +22,7 @@ tests! {
     faults_survive_a_resume_and_the_summary_names_what_ended_the_run: device,
     a_study_ends_without_the_adapter_that_it_began_with: device,
     without_a_driver_that_works_auto_works_and_gpu_says_why_not: everywhere,
-    processes_that_share_a_device_all_finish_with_the_same_results: device,
+    processes_that_share_a_device_all_finish_with_the_same_results: device full,
     a_sweep_tells_of_faults_and_dispatches_run_by_run: device,
     what_would_take_all_memory_is_refused_with_what_would_not: everywhere,
 }

@@ -17,10 +17,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 tests! {
-    lines_on_the_device_lose_nothing_to_faults_and_breaks: device,
-    cars_on_the_device_lose_nothing_to_faults_and_breaks: device,
-    laps_on_the_device_lose_nothing_to_faults_and_breaks: device,
-    swarms_of_one_objective_on_the_device_lose_nothing_to_faults_and_breaks: device,
+    lines_on_the_device_lose_nothing_to_faults_and_breaks: device full,
+    cars_on_the_device_lose_nothing_to_faults_and_breaks: device full,
+    laps_on_the_device_lose_nothing_to_faults_and_breaks: device full,
+    swarms_of_one_objective_on_the_device_lose_nothing_to_faults_and_breaks: device full,
 }
 
 /// Candidates, objectives and evaluations.

@@ -15,7 +15,7 @@ tests! {
     a_hybrid_that_is_told_to_stop_while_it_looks_for_its_line_is_resumed: everywhere,
     a_drive_that_is_told_to_stop_is_resumed: everywhere,
     an_interrupted_run_says_so_and_what_is_not_its_state_is_refused: everywhere,
-    a_full_disk_leaves_whole_files_or_none_and_room_lets_the_run_end: everywhere,
+    a_full_disk_leaves_whole_files_or_none_and_room_lets_the_run_end: full,
 }
 
 const STUDY: &str = "section = \"Abbey\"\nbackend = \"simd\"\n[swarm]\npopulation = 24\niterations = 12\n";

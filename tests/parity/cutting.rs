@@ -12,7 +12,7 @@ use lapswarm::parity::synthetic_lap::{Lap, candidates};
 
 tests! {
     a_candidate_costs_the_same_alone_and_among_others: also_device,
-    batches_and_chunks_do_not_show: device,
+    batches_and_chunks_do_not_show: device full,
     long_windows_are_driven_in_chunks_that_do_not_show: device,
     windows_longer_than_a_driver_bears_are_driven_to_their_end: device,
     more_steps_than_a_driver_bears_are_refused: device,

@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 tests! {
     all_adapters_together_give_the_bytes_of_one: two_software_devices,
-    a_second_software_driver_keeps_parity: swiftshader,
+    a_second_software_driver_keeps_parity: swiftshader full,
 }
 
 /// The program on these drivers.

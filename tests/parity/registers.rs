@@ -6,7 +6,7 @@
 use crate::common::radv::{self, FAMILIES};
 
 tests! {
-    kernels_fit_the_registers_of_graphics_processors: radv,
+    kernels_fit_the_registers_of_graphics_processors: radv full,
 }
 
 /// What kernels whose names have these whole words, and end so, may take at most on each processor of [`FAMILIES`].

@@ -3,6 +3,7 @@
 use lapswarm::evaluate::point::{CallCost, Constraint, PointEvaluator};
 use lapswarm::evaluate::{Objective, Problem, Variable};
 use lapswarm::swarm::checkpoint::{load_optimiser, save_optimiser};
+use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::swarm::{
     Front, Islands, MULTI_OBJECTIVE, Mopso, MopsoSettings, Optimiser, SINGLE_OBJECTIVE, Sizes, Stopped,
     by_name, run, step,
@@ -163,6 +164,63 @@ fn equalities_hold_within_their_tolerance() {
         "{}",
         found.front.violation
     );
+}
+
+/// The largest product of ten coordinates on the unit sphere, G3 of Runarsson and Yao (*Stochastic ranking for constrained evolutionary
+/// optimization*, 2000): 1, where all are equal; the tolerance of the sphere allows 5e-4 more. A swarm that may only come nearer to
+/// the sphere stops where it meets it, at 0.6 to 0.99.
+#[test]
+fn a_swarm_moves_along_the_surface_of_an_equality() {
+    let function = |x: &[f64], f: &mut [f64]| {
+        f[0] = -x.iter().map(|x| x * 10f64.sqrt()).product::<f64>();
+        f[1] = x.iter().map(|x| x * x).sum::<f64>() - 1.0;
+    };
+    for seed in 1..4 {
+        let found = minimise_several(&[(0.0, 1.0); 10], 1, function)
+            .constraints(vec![Constraint::zero_within(1e-4)])
+            .seed(seed)
+            .run()
+            .unwrap();
+        let (x, cost) = found.best().unwrap();
+        assert!(
+            found.is_feasible() && (cost + 1.0005).abs() < 1e-5,
+            "{cost} at {x:?}, seed {seed}"
+        );
+    }
+}
+
+/// MW1 of Ma and Wang (*Evolutionary constrained multiobjective optimization: test suite construction and performance comparisons*,
+/// 2019): its feasible region is a few narrow patches about the front, and every way there leads over hollows of the violation. A swarm
+/// that follows its one least violating candidate finds none of them with four seeds of nine, and a part of the front with four more.
+#[test]
+fn narrow_feasible_regions_are_found_and_filled() {
+    let function = |x: &[f64], f: &mut [f64]| {
+        let n = x.len() as f64;
+        let apart = |(i, x): (usize, &f64)| {
+            let off = x.powf(n - 2.0) - 0.5 - i as f64 / (2.0 * n);
+            1.0 - (-10.0 * off * off).exp()
+        };
+        let distance = 1.0 + x.iter().enumerate().skip(1).map(apart).sum::<f64>();
+        f[0] = x[0];
+        f[1] = distance * (1.0 - 0.85 * x[0] / distance);
+        let along = std::f64::consts::SQRT_2 * (f[1] - f[0]);
+        f[2] = f[0] + f[1] - 1.0 - 0.5 * (2.0 * std::f64::consts::PI * along).sin().powi(8);
+    };
+    for seed in 1..6 {
+        let found = minimise_several(&[(0.0, 1.0); 15], 2, function)
+            .constraints(vec![Constraint::at_most_zero()])
+            .seed(seed)
+            .run()
+            .unwrap();
+        let front = &found.front;
+        assert!(found.is_feasible(), "{} with seed {seed}", front.violation);
+        let volume = hypervolume(&front.objectives, &[1.1, 1.1]).unwrap();
+        assert!(
+            front.objectives.len() == 100 && volume > 0.59,
+            "{volume} of {}, seed {seed}",
+            front.objectives.len()
+        );
+    }
 }
 
 #[test]

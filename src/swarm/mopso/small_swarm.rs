@@ -11,6 +11,7 @@ use crate::swarm::motion::{Particles, Purpose, Trials, polynomial};
 use crate::swarm::settings::{Leaders, MopsoSettings};
 use crate::swarm::{Counters, Front, Optimiser};
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Particles in rows, and their archive.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -79,12 +80,21 @@ impl SmallSwarm {
         3 * self.particles.dimensions() * size_of::<f64>() + row
     }
 
+    /// The parent that a particle follows, as [`parent`] counts them. While nothing feasible is known, the archive has little more
+    /// than the one candidate that violates least, and a swarm that follows it ends in the hollow where that lies: of two particles'
+    /// own bests the one that violates less leads.
     fn leader(&self, worth: &[f64], particle: usize) -> usize {
-        let draw = |index| {
+        let draw = |count, index| {
             let (when, who) = (self.counters.iteration as u32, particle as u32);
-            self.random
-                .below(self.archive.len(), Purpose::Leader as u32, when, who, index)
+            self.random.below(count, Purpose::Leader as u32, when, who, index)
         };
+        let members = self.archive.len();
+        if self.archive.violation() > 0.0 {
+            let [first, second] = [0, 1].map(|index| draw(self.particles.count, index));
+            let second_leads = self.best_violation[second] < self.best_violation[first];
+            return members + if second_leads { second } else { first };
+        }
+        let draw = |index| draw(members, index);
         let first = draw(0);
         match self.settings.leaders {
             Leaders::Random => first,
@@ -99,14 +109,29 @@ impl SmallSwarm {
         }
     }
 
-    /// From an archive member along the difference of two others, in some of the coordinates \[7\].
+    /// The parents that a leader's mates are drawn from, as [`parent`] counts them: the archive's members, or the particles' own bests
+    /// where constraints leave few members.
+    fn mates(&self) -> Range<usize> {
+        let members = self.archive.len();
+        let violates = |violation: &f64| (f64::MIN_POSITIVE..f64::INFINITY).contains(violation);
+        let few = 2 * members < self.settings.archive.min(self.particles.count);
+        let infeasible = self.archive.violation() > 0.0;
+        if infeasible || few && self.best_violation.iter().any(violates) {
+            members..members + self.particles.count
+        } else {
+            0..members
+        }
+    }
+
+    /// From the leader along the difference of two mates, in some of the coordinates \[7\].
     fn difference_move(&mut self, particle: usize, leader: usize) {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
         let purpose = Purpose::Difference as u32;
         let pick = |index: u32, count: usize| self.random.below(count, purpose, when, who, index);
-        let members = self.archive.len();
+        let mates = self.mates();
+        let [first, second] = [0, 1].map(|index| mates.start + pick(index, mates.len()));
         let [from, first, second] =
-            [leader, pick(0, members), pick(1, members)].map(|m| &self.archive.positions[m]);
+            [leader, first, second].map(|m| parent(&self.archive, &self.best_position, m));
         let row = self.particles.row(particle);
         let always = pick(2, row.len().max(1));
         for (k, i) in row.enumerate() {
@@ -121,15 +146,17 @@ impl SmallSwarm {
         }
     }
 
-    /// To a place between or about two archive members, each coordinate by itself, disturbed by polynomial mutation, as the
+    /// To a place between or about the leader and a mate, each coordinate by itself, disturbed by polynomial mutation, as the
     /// children of genetic algorithms \[5\].
     fn crossing(&mut self, particle: usize, leader: usize) {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
         let uniform = |purpose: Purpose, index: u32| self.random.uniform(purpose as u32, when, who, index);
-        let other = self
+        let mates = self.mates();
+        let drawn = self
             .random
-            .below(self.archive.len(), Purpose::Recombine as u32, when, who, 4);
-        let [one, other] = [leader, other].map(|m| &self.archive.positions[m]);
+            .below(mates.len(), Purpose::Recombine as u32, when, who, 4);
+        let [one, other] =
+            [leader, mates.start + drawn].map(|m| parent(&self.archive, &self.best_position, m));
         let share = 1.0 / self.particles.dimensions() as f64;
         for (k, i) in self.particles.row(particle).enumerate() {
             let drawn = |index: u32| uniform(Purpose::Recombine, 8 + 4 * k as u32 + index);
@@ -166,7 +193,7 @@ impl SmallSwarm {
                     Move::Pull => {
                         let own = &self.best_position[self.particles.row(particle)];
                         self.particles.one(particle).pull(
-                            (own, &self.archive.positions[leader]),
+                            (own, parent(&self.archive, &self.best_position, leader)),
                             &self.settings.motion,
                             (share, self.counters.iteration),
                             self.random,
@@ -189,6 +216,15 @@ impl SmallSwarm {
     fn coin(&self, purpose: Purpose, particle: usize) -> f64 {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
         self.random.uniform(purpose as u32, when, who, 0)
+    }
+}
+
+/// The position of a parent: the archive's members come first, then the particles' own bests. There has to be a member.
+fn parent<'a>(archive: &'a Archive, own_bests: &'a [f64], parent: usize) -> &'a [f64] {
+    let dimensions = archive.positions[0].len();
+    match parent.checked_sub(archive.len()) {
+        None => &archive.positions[parent],
+        Some(particle) => &own_bests[particle * dimensions..(particle + 1) * dimensions],
     }
 }
 
