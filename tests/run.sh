@@ -1,7 +1,7 @@
 #!/bin/sh
 # All checks, in two tiers. Times are on two cores, without the build; tests/README.md has them by target.
 #
-#   tests/run.sh         format, lints, docs, and the tests with every kernel's parity and every reader: about 20 minutes
+#   tests/run.sh         format, lints, docs, and the tests with every kernel's parity and every reader: about a quarter of an hour
 #   tests/run.sh full    also what takes long: kills, device faults, whole identifications and searches, the examples, a soak,
 #                        licences, and the unsafe code under the address sanitizer: about 40 minutes
 #
