@@ -81,8 +81,8 @@ impl SmallSwarm {
     }
 
     /// The parent that a particle follows, as [`parent`] counts them. While nothing feasible is known, the archive has little more
-    /// than the one candidate that violates least, and a swarm that follows it ends in the hollow where that lies: of two particles'
-    /// own bests the one that violates less leads.
+    /// than the one candidate that violates least. A swarm that follows it ends in the hollow where that lies. So two particles are
+    /// drawn, and the own best that violates less leads.
     fn leader(&self, worth: &[f64], particle: usize) -> usize {
         let draw = |count, index| {
             let (when, who) = (self.counters.iteration as u32, particle as u32);
@@ -113,7 +113,7 @@ impl SmallSwarm {
     /// where constraints leave few members.
     fn mates(&self) -> Range<usize> {
         let members = self.archive.len();
-        let violates = |violation: &f64| (f64::MIN_POSITIVE..f64::INFINITY).contains(violation);
+        let violates = |violation: &f64| *violation > 0.0 && violation.is_finite();
         let few = 2 * members < self.settings.archive.min(self.particles.count);
         let infeasible = self.archive.violation() > 0.0;
         if infeasible || few && self.best_violation.iter().any(violates) {
