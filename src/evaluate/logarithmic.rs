@@ -3,11 +3,16 @@
 //! Factors of the Magic Formula stand in for one another as products: `B C` is a slope, so that its valley is a
 //! hyperbola over `B` and `C` and a straight line over their logarithms, which an adapted normal distribution can follow.
 
-use super::{BackendInfo, Evaluation, Evaluator, Problem};
+use super::{BackendInfo, Evaluation, Evaluator, Problem, Variable};
 use crate::error::Result;
 
 /// Parameters whose bounds are both positive and this far apart, as a ratio, are seen by their logarithm.
 const WIDE: f64 = 1.5;
+
+/// Whether a parameter is of such a range.
+pub fn is_logarithmic(variable: &Variable) -> bool {
+    variable.lower > 0.0 && variable.upper > WIDE * variable.lower
+}
 
 /// An evaluator whose positive parameters of wide range are given as logarithms.
 pub struct Logarithmic<'a> {
@@ -20,11 +25,7 @@ impl<'a> Logarithmic<'a> {
     /// The evaluator in these coordinates.
     pub fn new(inner: &'a mut dyn Evaluator) -> Self {
         let mut problem = inner.problem().clone();
-        let logarithmic: Vec<bool> = problem
-            .variables
-            .iter()
-            .map(|v| v.lower > 0.0 && v.upper > WIDE * v.lower)
-            .collect();
+        let logarithmic: Vec<bool> = problem.variables.iter().map(is_logarithmic).collect();
         for (variable, _) in problem
             .variables
             .iter_mut()

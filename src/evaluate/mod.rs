@@ -48,7 +48,7 @@ pub use gpu::OnDevice;
 #[cfg(feature = "gpu")]
 pub use gpu::{DeviceKernel, FallbackEvaluator, GpuBackend};
 pub use ill_formed::IllFormed;
-pub use logarithmic::Logarithmic;
+pub use logarithmic::{Logarithmic, is_logarithmic};
 #[cfg(feature = "vehicle")]
 pub use model_table::ModelTable;
 pub use open::open_evaluator;

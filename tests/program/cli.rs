@@ -681,13 +681,13 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
     let before = files_in(folder.path());
     let line = [&["--line", "ring.csv"], AROUND_RING.as_slice()].concat();
     let setups = [line.as_slice(), &["--setups", "3", "--backend", "simd"]].concat();
-    // Each with an evaluation's number where one is known beforehand: of the adaptive swarms 128 * 50 + 64 * 1500; of three
+    // Each with an evaluation's number where one is known beforehand: of the adaptive swarms 128 * 50 + 64 * 150; of three
     // parameters a base car, four levels of each and eight samples of five; 5 * 5; four set-ups with 21 shares of the grip;
     // 71 of these alone, each by four drivers; four runs of inertia and two each of the pulls with three seeds, 50 * 100 cars each;
     // speeds of 18, 38 and 58 m/s by 128 steering angles.
     let studies: &[(&str, &[&str], Option<u64>)] = &[
         ("run", &[], None),
-        ("identify", &[], Some(128 * 50 + 64 * 1500)),
+        ("identify", &[], Some(128 * 50 + 64 * 150)),
         ("raceline", &AROUND_RING, None),
         ("hybrid", &["--scenarios-only", "--sections", "60"], None),
         ("envelope", &["--step-mps", "20"], Some(3 * 128)),
@@ -722,10 +722,10 @@ fn a_dry_run_of_any_study_says_what_it_would_do_and_writes_nothing() {
         assert_eq!(told["study"], study);
         assert_eq!(told["dry_run"], true);
         assert_eq!(told["evaluations"].as_u64(), evaluations, "{study}");
-        // What follows the swarm: two polishes of 150 drives, four rounds of 50, and hops of 64 starts and 120 drives. The sweep
-        // is without.
+        // What follows the swarm: two polishes of 100 steps, four rounds of 25, and hops of 1024 starts and 60 steps. Each has a first
+        // drive, and three for a step. The sweep is without.
         let hops = told["settings"]["hops"].as_u64().unwrap_or(0);
-        let polish = (study == "identify").then_some(2 * 150 + 4 * 50 + hops * (64 + 120));
+        let polish = (study == "identify").then_some(2 * 301 + 4 * 76 + hops * (1024 + 181));
         assert_eq!(told["polish_drives"].as_u64(), polish, "{study}");
         assert_eq!(told["folder"], "new");
         assert_eq!(told["folder_exists"], false);

@@ -1,5 +1,6 @@
 //! Exact derivatives of the replayed outputs to the free parameters, by dual numbers.
 
+use super::cpu::trace;
 use super::kernel::{CHANNELS, drive_window};
 use super::plan::Window;
 use super::problem::ReplayProblem;
@@ -52,6 +53,27 @@ fn drive_chunk<T: Tyre<Dual>>(
 }
 
 impl ReplayProblem {
+    /// The errors of a candidate, as [`Self::residuals`] has them, without derivatives; `None` if the candidate fails. Windows are
+    /// driven side by side.
+    pub fn errors(&self, candidate: &[f64]) -> Option<Vec<f64>> {
+        if self.free.preliminary_failure(candidate).is_some() {
+            return None;
+        }
+        let flat = self.flat(candidate);
+        let errors = |window: &Window<f64>| -> Option<Vec<f64>> {
+            let traced = trace(&flat, self.tyre_model(), &self.plan, window);
+            let scored = window.start + window.scored_from..window.end;
+            let outputs = &traced.outputs[window.scored_from..];
+            let pairs = outputs.iter().zip(&self.plan.samples[scored]);
+            let errors =
+                pairs.flat_map(|(outputs, s)| (0..CHANNELS).map(move |k| outputs[k] - s.measured[k]));
+            traced.drives.then(|| errors.collect())
+        };
+        let driven: Vec<Vec<f64>> = self.plan.windows.par_iter().map(errors).collect::<Option<_>>()?;
+        let errors = driven.concat();
+        errors.iter().all(|x| x.is_finite()).then_some(errors)
+    }
+
     /// The errors of a candidate with their exact derivatives; `None` if the candidate fails. Windows, and eight parameters each, are
     /// driven side by side.
     pub fn residuals(&self, candidate: &[f64]) -> Option<Residuals> {

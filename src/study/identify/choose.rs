@@ -80,8 +80,8 @@ const LADDER: [usize; 12] = [1, 2, 3, 4, 6, 8, 11, 15, 20, 30, 45, 70];
 const LOOKS_AT_S: f64 = 120.0;
 /// Runge-Kutta steps of one drive through all of these, at the most.
 const LOOKS_AT_STEPS: f64 = 20_000.0;
-/// Drives of each polish.
-const DRIVES: usize = 10;
+/// Steps of each polish.
+const STEPS: usize = 10;
 /// A longer list must lower the error by this share, or the shorter one is taken.
 const WORTH: f64 = 0.005;
 /// Share of the windows that were not fitted which a list has to drive. A window that it loses, such as one in which the car was already
@@ -133,7 +133,7 @@ impl<'a> Path<'a> {
         }
         let part = part_of(self.pool, &self.chosen)?;
         let from: Vec<f64> = self.chosen.iter().map(|&k| self.values[k]).collect();
-        if let Some(polished) = polish_observed(&part, &from, self.weights, DRIVES, watch) {
+        if let Some(polished) = polish_observed(&part, &from, self.weights, STEPS, watch) {
             self.over |= polished.interrupted;
             for (&k, x) in self.chosen.iter().zip(polished.candidate) {
                 self.values[k] = x;

@@ -1,6 +1,7 @@
 //! Identification: which car drove this lap?
 
 mod choose;
+mod descent;
 mod hops;
 mod identifiability;
 mod notes;
@@ -80,7 +81,7 @@ impl Study for Identify {
     }
 
     fn plan(settings: &IdentifySettings, setup: &Setup, plan: Plan) -> Result<Plan> {
-        let polish = refine::most_drives(settings, setup.replay.dimensions());
+        let polish = refine::most_drives(settings);
         let plan = plan.evaluations(settings.evaluations()).polish_drives(polish);
         planned(settings, setup, plan)
     }

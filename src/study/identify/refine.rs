@@ -3,7 +3,7 @@
 
 use super::hops::{self, STARTS, gains, hop, looks_like_noise};
 use super::identifiability::{noise_of, weights_of};
-use super::polish::{MOST_DRIVES, polish_observed};
+use super::polish::{DRIVES_A_STEP, MOST_STEPS, polish_observed};
 use super::settings::IdentifySettings;
 use super::setup::{CHANNELS, Setup};
 use crate::error::Result;
@@ -41,7 +41,7 @@ pub(super) fn refine(
         interrupted: false,
     };
     let spread = setup.scales.map(|s| 1.0 / s);
-    let Some(polished) = polish_observed(replay, candidate, spread, MOST_DRIVES, watch) else {
+    let Some(polished) = polish_observed(replay, candidate, spread, MOST_STEPS, watch) else {
         return Ok(refined);
     };
     refined.interrupted = polished.interrupted;
@@ -69,14 +69,13 @@ pub(super) fn refine(
             if weights == spread {
                 return Ok(refined);
             }
-            if let Some(p) = polish_observed(replay, &refined.candidate, weights, MOST_DRIVES, watch) {
+            if let Some(p) = polish_observed(replay, &refined.candidate, weights, MOST_STEPS, watch) {
                 refined.interrupted = p.interrupted;
                 refined.candidate = p.candidate;
             }
             return Ok(refined);
         }
-        let from = (&refined.candidate[..], spread);
-        let hopped = hop(replay, evaluator, from, (settings.seed, refined.hops), watch)?;
+        let hopped = hop(replay, evaluator, spread, (settings.seed, refined.hops), watch)?;
         refined.hops += 1;
         if let Some(hopped) = hopped {
             refined.interrupted = hopped.interrupted;
@@ -91,13 +90,13 @@ pub(super) fn refine(
 
 /// Rounds of [`restarted`] at the most. Each leaves a small share of what the one before was off by.
 const ROUNDS: usize = 4;
-/// Drives that a round may take: it begins close to where it ends.
-const ROUND_DRIVES: usize = 50;
+/// Steps that a round may take: it begins close to where it ends.
+const ROUND_STEPS: usize = 25;
 /// A round that moves no parameter by more than this share of its range is the last.
 const MOVED: f64 = 1e-5;
 
-/// Drives of the polish at the most, with hops and rounds, of so many free parameters; and the starts that hops draw.
-pub(super) fn most_drives(settings: &IdentifySettings, dimensions: usize) -> u64 {
+/// Drives of the polish at the most, with hops and rounds, and the starts that hops draw.
+pub(super) fn most_drives(settings: &IdentifySettings) -> u64 {
     if !settings.polish {
         return 0;
     }
@@ -106,9 +105,9 @@ pub(super) fn most_drives(settings: &IdentifySettings, dimensions: usize) -> u64
     } else {
         0
     };
-    let polished = |drives: usize| drives.max(dimensions + 1) as u64;
-    let hop = (STARTS as u64).saturating_add(polished(hops::MOST_DRIVES));
-    (2 * polished(MOST_DRIVES) + ROUNDS as u64 * polished(ROUND_DRIVES))
+    let polished = |steps: usize| (1 + DRIVES_A_STEP * steps) as u64;
+    let hop = STARTS as u64 + polished(hops::MOST_STEPS);
+    (2 * polished(MOST_STEPS) + ROUNDS as u64 * polished(ROUND_STEPS))
         .saturating_add(hop.saturating_mul(hops as u64))
 }
 
@@ -130,7 +129,7 @@ pub(super) fn restarted(
             break;
         };
         let weights = weights_of(&residuals.errors, &setup.scales, replay.dimensions());
-        let Some(polished) = polish_observed(&replay, &candidate, weights, ROUND_DRIVES, watch) else {
+        let Some(polished) = polish_observed(&replay, &candidate, weights, ROUND_STEPS, watch) else {
             break;
         };
         let variables = replay.problem.variables.iter();
@@ -179,7 +178,7 @@ mod tests {
         };
         let stuck = refined(0);
         assert!(stuck.hops == 0 && error(&stuck.candidate) > 1.0);
-        let free = refined(2);
+        let free = refined(settings.hops);
         assert!(
             free.hops_gained > 0 && error(&free.candidate) < 1e-3,
             "{}",

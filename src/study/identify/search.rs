@@ -327,7 +327,7 @@ pub fn check_swarms(settings: &IdentifySettings, setup: &Setup) -> Result<()> {
 fn gathering(settings: &IdentifySettings) -> CovarianceSettings {
     CovarianceSettings {
         population: settings.population.unwrap_or(GATHER.0),
-        iterations: settings.iterations.unwrap_or(GATHER.1),
+        iterations: settings.gathering(),
         seed: settings.seed,
         // Along the valley what did not pay tells as much as what did: it halves the error that is left.
         active: true,
@@ -419,7 +419,7 @@ impl IdentifySettings {
         let first = swarm_settings(self);
         let gathered = if self.algorithm == Algorithm::Adaptive && self.objectives.len() == 1 {
             let population = self.population.unwrap_or(GATHER.0);
-            cars(population, self.iterations.unwrap_or(GATHER.1))
+            cars(population, self.gathering())
         } else {
             0
         };

@@ -22,8 +22,9 @@ use std::path::{Path, PathBuf};
 /// Exploring swarm of the adaptive search: many particles for a short while. Twice as many as a study's own number at most,
 /// and for no more iterations than that has.
 pub(super) const EXPLORE: (usize, usize) = (128, 50);
-/// Gathering swarm of the adaptive search.
-pub(super) const GATHER: (usize, usize) = (64, 1500);
+/// Gathering swarm of the adaptive search, which the polish follows, and its iterations where nothing is polished.
+pub(super) const GATHER: (usize, usize) = (64, 150);
+const GATHER_ALONE: usize = 1500;
 
 /// Swarm of a search for several costs: of 64 to 1024 particles with as many cars in all, those that came furthest
 /// (`lapswarm bench studies`).
@@ -227,8 +228,8 @@ settings! {
             "Seed of all random numbers";
         polish: bool ["-"] = true, switch(true).flag(Flag::Switch("no_polish", false)).search(),
             "Whether the swarm's best is polished by least squares";
-        hops: usize ["-"] = 2, count(0, 1000).search(),
-            "Hops from the polished minimum to others that are tried where the errors that remain do not look like noise";
+        hops: usize ["-"] = 4, count(0, 1000).search(),
+            "Further polishes, each from the best of 1024 draws, while the errors that remain do not look like noise";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where candidates are evaluated";
         adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
@@ -367,6 +368,12 @@ impl IdentifySettings {
         }
     }
 
+    /// Iterations of the gathering swarm of the adaptive search.
+    pub(super) fn gathering(&self) -> usize {
+        let usual = if self.polish { GATHER.1 } else { GATHER_ALONE };
+        self.iterations.unwrap_or(usual)
+    }
+
     /// What the study's memory goes with.
     pub fn size(&self) -> Size {
         let several = self.objectives.len() > 1;
@@ -378,7 +385,7 @@ impl IdentifySettings {
                 None if self.free.is_empty() => pool::MOST,
                 None => self.free.len(),
             },
-            iterations: self.iterations.unwrap_or(GATHER.1),
+            iterations: self.gathering(),
             archive: if several { self.archive } else { 0 },
             ..Size::default()
         }

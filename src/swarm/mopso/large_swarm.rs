@@ -18,6 +18,7 @@ use crate::swarm::archive::Archive;
 #[cfg(feature = "gpu")]
 use crate::swarm::device::DeviceState;
 use crate::swarm::metrics::dominates;
+use crate::swarm::motion::Purpose;
 use crate::swarm::settings::{MopsoSettings, setting};
 use crate::swarm::space::Space;
 use crate::swarm::{Counters, Front, Optimiser};
@@ -394,12 +395,41 @@ impl LargeSwarm {
         told.fold(self.archive.violation(), f64::min)
     }
 
+    /// The positions that lead, the best first. While nothing feasible is known, those are particles' own bests, as in a small
+    /// swarm: of two that are drawn, the one that violates less.
+    fn leaders(&mut self) -> Vec<f32> {
+        if self.archive.is_empty() || self.archive.violation() == 0.0 || self.best_violation.is_empty() {
+            return leaders(&mut self.archive);
+        }
+        let (when, n) = (self.counters.iteration as u32, self.settings.motion.population);
+        let draw = |place: usize| {
+            let drawn = |index| {
+                self.random
+                    .below(n, Purpose::Leader as u32, when, place as u32, index)
+            };
+            let [first, second] = [0, 1].map(drawn);
+            let second_leads = self.best_violation[second] < self.best_violation[first];
+            if second_leads { second } else { first }
+        };
+        let mut drawn: Vec<usize> = (0..self.settings.archive).map(draw).collect();
+        drawn.sort_by(|&a, &b| self.best_violation[a].total_cmp(&self.best_violation[b]));
+        let swarm = &*self;
+        let position = |particle| {
+            let coordinates = 0..swarm.space.dimensions();
+            coordinates.map(move |k| swarm.best_position[swarm.place(particle, k)])
+        };
+        drawn.into_iter().flat_map(position).collect()
+    }
+
     /// Moves the swarm.
     fn advance(&mut self) {
         let d = self.space.dimensions();
-        let generation = self.generation();
+        let leaders = self.leaders();
+        let generation = Generation {
+            members: (leaders.len() / d.max(1)) as u32,
+            ..self.generation()
+        };
         let random = self.random;
-        let leaders = leaders(&mut self.archive);
         self.position
             .par_chunks_mut(PART * d)
             .zip(self.velocity.par_chunks_mut(PART * d))
