@@ -99,7 +99,11 @@ fn one_corner_is_enough_for_a_small_swarm() {
 #[test]
 #[ignore = "full tier: a whole identification"]
 fn a_cold_swarm_and_polish_find_the_car() {
-    let settings = simd();
+    let settings = IdentifySettings {
+        population: Some(64),
+        iterations: Some(150),
+        ..simd()
+    };
     let setup = set_up(&settings).unwrap();
     let outcome = solve_unobserved::<Identify>(&settings, &setup).unwrap();
     let folder = tempfile::tempdir().unwrap();

@@ -395,11 +395,17 @@ impl LargeSwarm {
         told.fold(self.archive.violation(), f64::min)
     }
 
-    /// The positions that lead, the best first. While nothing feasible is known, those are particles' own bests, as in a small
-    /// swarm: of two that are drawn, the one that violates less.
+    /// The positions that lead and mate, the best first: the archive's, and own bests of particles that are drawn. As in a small swarm,
+    /// own bests stand in for all members while nothing feasible is known, of two each the one that violates less. While constraints
+    /// leave the archive less than half full, they stand in for the members that it lacks.
     fn leaders(&mut self) -> Vec<f32> {
-        if self.archive.is_empty() || self.archive.violation() == 0.0 || self.best_violation.is_empty() {
-            return leaders(&mut self.archive);
+        let mut leading = leaders(&mut self.archive);
+        let (members, wanted) = (self.archive.len(), self.settings.archive);
+        let infeasible = self.archive.violation() > 0.0;
+        let violates = |violation: &f64| *violation > 0.0 && violation.is_finite();
+        let few = 2 * members < wanted && self.best_violation.iter().any(violates);
+        if members == 0 || self.best_violation.is_empty() || !(infeasible || few) {
+            return leading;
         }
         let (when, n) = (self.counters.iteration as u32, self.settings.motion.population);
         let draw = |place: usize| {
@@ -408,17 +414,21 @@ impl LargeSwarm {
                     .below(n, Purpose::Leader as u32, when, place as u32, index)
             };
             let [first, second] = [0, 1].map(drawn);
-            let second_leads = self.best_violation[second] < self.best_violation[first];
+            let second_leads = infeasible && self.best_violation[second] < self.best_violation[first];
             if second_leads { second } else { first }
         };
-        let mut drawn: Vec<usize> = (0..self.settings.archive).map(draw).collect();
-        drawn.sort_by(|&a, &b| self.best_violation[a].total_cmp(&self.best_violation[b]));
-        let swarm = &*self;
-        let position = |particle| {
-            let coordinates = 0..swarm.space.dimensions();
-            coordinates.map(move |k| swarm.best_position[swarm.place(particle, k)])
+        let mut drawn: Vec<usize> = if infeasible {
+            leading.clear();
+            (0..wanted).map(draw).collect()
+        } else {
+            (members..wanted).map(draw).collect()
         };
-        drawn.into_iter().flat_map(position).collect()
+        drawn.sort_by(|&a, &b| self.best_violation[a].total_cmp(&self.best_violation[b]));
+        for particle in drawn {
+            let coordinates = 0..self.space.dimensions();
+            leading.extend(coordinates.map(|k| self.best_position[self.place(particle, k)]));
+        }
+        leading
     }
 
     /// Moves the swarm.
