@@ -1,9 +1,9 @@
 #!/bin/sh
 # All checks, in two tiers. Times are on two cores, without the build; tests/README.md has them by target.
 #
-#   tests/run.sh         format, lints, docs, and the tests with every kernel's parity and every reader: about a quarter of an hour
+#   tests/run.sh         format, lints, docs, and the tests with every kernel's parity and every reader: about ten minutes
 #   tests/run.sh full    also what takes long: kills, device faults, registers, whole identifications and searches, examples, a soak,
-#                        licences, and the unsafe code under the address sanitizer: about 40 minutes
+#                        licences, and the unsafe code under the address sanitizer: 20 to 40 minutes
 #
 # Installs a software Vulkan driver where apt is there, so that the GPU tests run on machines without a GPU; elsewhere it says
 # what to do.
