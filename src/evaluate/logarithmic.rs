@@ -9,7 +9,7 @@ use crate::error::Result;
 /// Parameters whose bounds are both positive and this far apart, as a ratio, are seen by their logarithm.
 const WIDE: f64 = 1.5;
 
-/// Whether a parameter is of such a range.
+/// Whether optimisers see a parameter by its logarithm: both bounds are positive, and the upper is more than 1.5 times the lower.
 pub fn is_logarithmic(variable: &Variable) -> bool {
     variable.lower > 0.0 && variable.upper > WIDE * variable.lower
 }

@@ -53,8 +53,8 @@ fn drive_chunk<T: Tyre<Dual>>(
 }
 
 impl ReplayProblem {
-    /// The errors of a candidate, as [`Self::residuals`] has them, without derivatives; `None` if the candidate fails. Windows are
-    /// driven side by side.
+    /// The errors of a candidate in the channels' units, by window, by scored sample, by channel, as in [`Residuals::errors`]; `None`
+    /// if the candidate fails. Windows are driven side by side.
     pub fn errors(&self, candidate: &[f64]) -> Option<Vec<f64>> {
         if self.free.preliminary_failure(candidate).is_some() {
             return None;

@@ -39,7 +39,7 @@ impl Place {
 
 /// Damping at first, as a share of the square of the longest column.
 const FIRST_DAMPING: f64 = 1e-3;
-/// Damping of a step that is as good as undamped: this share of the longest column is rounding, as it is where standard errors are judged.
+/// Damping of a step that is as good as undamped: this share of the longest column is rounding, as where standard errors are judged.
 const ROUNDING: f64 = 1e-11;
 /// Share of the step at which the second derivative is measured.
 const PROBE: f64 = 0.1;

@@ -19,7 +19,7 @@ pub struct Polished {
 }
 
 /// A polish ends where least squares promises to gain less than this share of what one residual costs on the mean. A parameter that
-/// is off by a standard error costs half as much as one residual, so one that is off by a hundredth costs half of this.
+/// is off by a standard error costs as much as one residual, so this is what one costs that is off by a hundredth.
 const LEAST_GAIN: f64 = 1e-4;
 /// Steps after which a polish that has not converged is left where it is. From what small swarms find, 30 to 50 lead to the minimum.
 pub(super) const MOST_STEPS: usize = 100;

@@ -22,8 +22,9 @@ use std::path::{Path, PathBuf};
 /// Exploring swarm of the adaptive search: many particles for a short while. Twice as many as a study's own number at most,
 /// and for no more iterations than that has.
 pub(super) const EXPLORE: (usize, usize) = (128, 50);
-/// Gathering swarm of the adaptive search, which the polish follows, and its iterations where nothing is polished.
+/// Gathering swarm of the adaptive search. The polish follows it, so it may be short.
 pub(super) const GATHER: (usize, usize) = (64, 150);
+/// Its iterations where nothing is polished.
 const GATHER_ALONE: usize = 1500;
 
 /// Swarm of a search for several costs: of 64 to 1024 particles with as many cars in all, those that came furthest
