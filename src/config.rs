@@ -6,6 +6,8 @@ mod document;
 #[cfg(feature = "vehicle")]
 pub mod kinds;
 #[cfg(feature = "vehicle")]
+mod separated;
+#[cfg(feature = "vehicle")]
 pub mod settings;
 
 pub use choice::Choice;
@@ -14,6 +16,8 @@ pub(crate) use choice::named;
 pub use document::{Document, Table};
 #[cfg(feature = "vehicle")]
 pub(crate) use document::{line_of, refused};
+#[cfg(feature = "vehicle")]
+pub(crate) use separated::{cells, with_commas};
 
 use crate::error::{Error, Place, Result};
 use std::cell::RefCell;
@@ -141,13 +145,6 @@ pub fn read_text(path: &Path) -> Result<String> {
         let found = format!("the byte 0x{:02x}", bytes[sound]);
         Error::input(path, Place::line(line), found, "text in UTF-8")
     })
-}
-
-/// The cells of a line of a table, without the quotes and spaces round them. None holds a separator.
-#[cfg(feature = "vehicle")]
-pub(crate) fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
-    line.split(separator)
-        .map(|cell| cell.trim().trim_matches('"').trim())
 }
 
 /// The longest name of a car, a circuit, a section or a scenario (bytes): names become parts of files' names, which end at 255.

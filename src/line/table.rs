@@ -1,8 +1,9 @@
 //! Lines in tables.
 
-use crate::config::{cells, read_text};
+use crate::config::{cells, read_text, with_commas};
 use crate::error::{Error, Place, Result};
 use glam::DVec2;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// The fewest rows of a table.
@@ -32,10 +33,10 @@ pub fn read_line(path: &Path) -> Result<Vec<DVec2>> {
 pub fn read_columns<const N: usize>(path: &Path, names: [&str; N], expected: &str) -> Result<Vec<[f64; N]>> {
     let text = read_text(path)?;
     let refuse = |place: Place, found: String| Error::input(path, place, found, expected);
-    let text = text.trim_start_matches('\u{feff}');
+    let text = with_commas(text.trim_start_matches('\u{feff}'));
     let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let mut lines = numbered.filter(|(_, line)| !line.is_empty());
-    let (separator, width, columns) = loop {
+    let (width, columns) = loop {
         let Some((number, line)) = lines.next() else {
             return Err(refuse(Place::line(1), "no header".to_owned()));
         };
@@ -48,7 +49,7 @@ pub fn read_columns<const N: usize>(path: &Path, names: [&str; N], expected: &st
     };
     let mut rows = Vec::new();
     for (line, text) in lines.filter(|(_, line)| !line.starts_with('#')) {
-        let cells: Vec<&str> = cells(text, separator).collect();
+        let cells = cells(text);
         let wrong = || refuse(Place::line(line), text.to_owned());
         if cells.len() != width {
             return Err(wrong());
@@ -66,20 +67,18 @@ pub fn read_columns<const N: usize>(path: &Path, names: [&str; N], expected: &st
     Ok(rows)
 }
 
-/// The separator of a header, how many cells it has, and the places of its columns, if it has all of these names.
-fn header_of<const N: usize>(header: &str, names: [&str; N]) -> Option<(char, usize, [usize; N])> {
-    let separators = [',', ';', '\t'].into_iter();
-    let separator = separators.max_by_key(|separator| header.matches(*separator).count())?;
-    let cells: Vec<&str> = cells(header, separator).collect();
+/// How many cells a header has, and the places of its columns, if it has all of these names.
+fn header_of<const N: usize>(header: &str, names: [&str; N]) -> Option<(usize, [usize; N])> {
+    let cells = cells(header);
     let mut columns = [0; N];
     for (column, name) in columns.iter_mut().zip(names) {
-        let named = |cell: &&str| {
+        let named = |cell: &Cow<'_, str>| {
             let unit = cell.strip_prefix(name);
             unit.is_some_and(|unit| unit.is_empty() || unit.starts_with(['_', ' ', '[']))
         };
         *column = cells.iter().position(named)?;
     }
-    Some((separator, cells.len(), columns))
+    Some((cells.len(), columns))
 }
 
 /// As [`read_line`], points at least `spacing_m` apart.

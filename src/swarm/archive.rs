@@ -161,6 +161,8 @@ impl Archive {
         self.positions.push(position.to_vec());
         if self.by_contribution() {
             self.shares.push(Share::default());
+            // The shares do not know of the new one yet.
+            self.move_reference();
             self.columns.push(objectives);
             self.refresh(objectives, true);
         }
@@ -280,6 +282,7 @@ impl Archive {
         let left = self.objectives[least].clone();
         self.drop_member(least);
         if self.by_contribution() {
+            self.move_reference();
             self.refresh(&left, false);
         }
     }
@@ -358,7 +361,6 @@ impl Archive {
 
     /// Updates the shares after `change` came, as the last member, or left.
     fn refresh(&mut self, change: &[f64], came: bool) {
-        self.move_reference();
         let new = came.then(|| self.len() - 1);
         for (i, most) in self.touched(change, new) {
             let share = &mut self.shares[i];
@@ -372,30 +374,31 @@ impl Archive {
 
     /// Brings the reference point behind the members there are, and the shares to it.
     fn move_reference(&mut self) {
+        if self.fixed {
+            return;
+        }
         let width = self.objectives.first().map_or(0, Vec::len);
-        let beyond = |k: usize| {
+        self.reference.resize(width, f64::INFINITY);
+        for k in 0..width {
             let (low, high) = self.range(k);
-            high + if high > low { BEYOND * (high - low) } else { 1.0 }
-        };
-        let reference = if self.fixed {
-            self.reference.clone()
-        } else {
-            (0..width).map(beyond).collect()
-        };
-        let moved = reference != self.reference;
-        let before = std::mem::replace(&mut self.reference, reference);
-        if moved {
-            // Where it comes nearer, members lose no more than what their boxes do.
-            let nearer: Vec<f64> = before
-                .iter()
-                .zip(&self.reference)
-                .map(|(a, b)| a.min(*b))
-                .collect();
-            for (share, row) in self.shares.iter_mut().zip(&self.objectives) {
-                let room =
-                    |end: &[f64]| -> f64 { end.iter().zip(row).map(|(end, x)| (end - x).max(0.0)).product() };
-                share.least = (share.least - (room(&before) - room(&nearer))).max(0.0);
-                share.exact = false;
+            let end = high + if high > low { BEYOND * (high - low) } else { 1.0 };
+            let before = std::mem::replace(&mut self.reference[k], end);
+            if before == end {
+                continue;
+            }
+            self.shares.iter_mut().for_each(|share| share.exact = false);
+            if before < end {
+                // Shares only grow.
+                continue;
+            }
+            // Members lose what they alone dominate between the two ends, where all of them reach.
+            let others = [&self.reference[..k], &self.reference[k + 1..]].concat();
+            let columns = self.columns.without(k);
+            for (i, share) in self.shares.iter_mut().enumerate() {
+                if share.least > 0.0 {
+                    let lost = (before - end) * columns.exclusive_at_most(i, &others);
+                    share.least = (share.least - lost).max(0.0);
+                }
             }
         }
     }

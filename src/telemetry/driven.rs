@@ -7,6 +7,7 @@ use super::path::start_line;
 use super::recording::{Channel, Recording};
 use super::role::Role;
 use super::{csv_native, motec_ld, text, vbox};
+use crate::config::with_commas;
 use crate::{Error, Place, Result};
 use std::ops::Range;
 use std::path::Path;
@@ -38,6 +39,7 @@ impl Recording {
         if vbox::is_vbo(&text, path) {
             return true;
         }
+        let text = with_commas(&text);
         let first = text::Rows::new(&text, path, true).next();
         first.and_then(Result::ok).is_some_and(|row| {
             row.cells.iter().any(|c| c == csv_native::TIME) || row.cell(0).eq_ignore_ascii_case("Format")

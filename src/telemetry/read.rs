@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::recording::{Format, Reading, Recording};
 use super::{csv_headed, csv_native, motec_csv, motec_ld, text, vbox};
-use crate::config::{LARGEST_LOG, read_bytes};
+use crate::config::{LARGEST_LOG, read_bytes, with_commas};
 use crate::{Error, Place, Result};
 
 impl Recording {
@@ -53,6 +53,10 @@ impl Recording {
         if vbox::is_vbo(&text, path) {
             return vbox::parse(&text, path, reading);
         }
+        let text = with_commas(&text);
+        if let Cow::Owned(table) = &text {
+            reading.fits(path, size, text::decoded_size(&bytes) + table.len() as u64)?;
+        }
         let mut rows = text::Rows::new(&text, path, true);
         let Some(first) = rows.next().transpose()? else {
             return Err(Error::input(path, Place::line(1), "no rows", "a log"));
@@ -80,8 +84,18 @@ mod tests {
     }
 
     #[test]
+    fn semicolons_and_decimal_commas_are_read() {
+        let points = "Time (s),Speed (km/h),\"Yaw rate, filtered (deg/s)\"\n0.5,100.25,-1e-2\n1.5,101,0\n";
+        let commas = "Time (s);Speed (km/h);Yaw rate, filtered (deg/s)\r\n0,5;100,25;-1e-2\r\n1,5;101;0\r\n";
+        let read = |text: &str| Recording::parse(text.as_bytes(), "a.csv").unwrap();
+        assert_eq!(read(commas), read(points));
+        let refused = Recording::parse(b"time_s;v\n0,5;1\n0,5,5;2\n", "a.csv").unwrap_err();
+        assert!(refused.to_string().contains("line 3"), "{refused}");
+    }
+
+    #[test]
     fn what_is_no_log_is_refused_with_what_was_found() {
-        for (bytes, found) in [(&b""[..], "no rows"), (b"hello;there", "hello;there")] {
+        for (bytes, found) in [(&b""[..], "no rows"), (b"hello there", "hello there")] {
             let error = Recording::parse(bytes, "a.csv").unwrap_err().to_string();
             assert!(
                 error.contains("a.csv: line 1") && error.contains(found),

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::recording::MOST_CHANNELS;
+use crate::config::cells;
 use crate::{Error, Place, Result};
 
 /// A quoted cell may span lines (a comment in a header); one that spans more lines was never closed.
@@ -133,7 +134,7 @@ impl<'a> Iterator for Rows<'a> {
                             format!("a row of at most {MOST_CHANNELS} cells"),
                         )));
                     }
-                    let cells = split(record);
+                    let cells = cells(record);
                     return Some(Ok(Row { line, cells }));
                 }
                 Err(error) => {
@@ -146,38 +147,11 @@ impl<'a> Iterator for Rows<'a> {
     }
 }
 
-fn split(record: &str) -> Vec<Cow<'_, str>> {
-    let mut cells = Vec::new();
-    let mut start = 0;
-    let mut quoted = false;
-    for (at, byte) in record.bytes().enumerate() {
-        match byte {
-            b'"' => quoted = !quoted,
-            b',' if !quoted => {
-                cells.push(unquote(&record[start..at]));
-                start = at + 1;
-            }
-            _ => {}
-        }
-    }
-    cells.push(unquote(&record[start..]));
-    cells
-}
-
-fn unquote(cell: &str) -> Cow<'_, str> {
-    let cell = cell.trim();
-    match cell.strip_prefix('"').and_then(|c| c.strip_suffix('"')) {
-        Some(inner) if inner.contains("\"\"") => Cow::Owned(inner.replace("\"\"", "\"").trim().to_owned()),
-        Some(inner) => Cow::Borrowed(inner.trim()),
-        None => Cow::Borrowed(cell),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn cells(text: &str) -> Vec<(usize, Vec<String>)> {
+    fn rows_of(text: &str) -> Vec<(usize, Vec<String>)> {
         Rows::new(text, Path::new("t.csv"), true)
             .map(|row| {
                 let row = row.unwrap();
@@ -188,7 +162,7 @@ mod tests {
 
     #[test]
     fn rows_keep_their_line_numbers_past_blanks_comments_and_carriage_returns() {
-        let rows = cells("# note\r\na,b\r\n\r\n\"1\",\"x, \"\"y\"\"\"\r\n\"two\nlines\",3\n4,5");
+        let rows = rows_of("# note\r\na,b\r\n\r\n\"1\",\"x, \"\"y\"\"\"\r\n\"two\nlines\",3\n4,5");
         assert_eq!(rows[0], (2, vec!["a".into(), "b".into()]));
         assert_eq!(rows[1], (4, vec!["1".into(), "x, \"y\"".into()]));
         assert_eq!(rows[2], (5, vec!["two\nlines".into(), "3".into()]));

@@ -2,7 +2,7 @@
 
 use super::friction::{FRICTION_PLACES, FRICTIONS};
 use super::survey::Survey;
-use crate::config::read_text;
+use crate::config::{read_text, with_commas};
 use crate::error::{Error, Place, Result};
 use glam::DVec2;
 use nalgebra::{SMatrix, SVector};
@@ -37,12 +37,13 @@ impl FrictionMap {
             Err(Error::input(file, Place::line(line), found, expected))
         };
         let (mut points_m, mut friction) = (Vec::new(), Vec::new());
-        for (i, row) in read_text(file)?.lines().enumerate() {
+        for (i, row) in with_commas(&read_text(file)?).lines().enumerate() {
             if row.trim().is_empty() || row.starts_with('#') || (i == 0 && row.starts_with('x')) {
                 continue;
             }
-            let cells = row.split([';', ',']);
-            let cells = cells.map(|cell| cell.trim().parse().ok().filter(|x: &f64| x.is_finite()));
+            let cells = row
+                .split(',')
+                .map(|cell| cell.trim().parse().ok().filter(|x: &f64| x.is_finite()));
             let cells: Vec<f64> = cells.collect::<Option<_>>().unwrap_or_default();
             let (point, of) = match cells[..] {
                 [x, y] => (DVec2::new(x, y), None),

@@ -14,7 +14,7 @@ use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::relief::{Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG, between_edges};
 use super::survey::{Survey, SurveyOptions};
-use crate::config::{folder_of, line_of, read_text};
+use crate::config::{folder_of, line_of, read_text, with_commas};
 use crate::{Error, Place, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -289,7 +289,7 @@ fn parse_table(
     closed: bool,
     width_m: Option<f64>,
 ) -> Result<(Vec<CurvatureRow>, Given)> {
-    let text = text.trim_start_matches('\u{feff}');
+    let text = &with_commas(text.trim_start_matches('\u{feff}'));
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)

@@ -52,20 +52,22 @@ const LEAST_SHARE: f64 = 1e-4;
 const MOST_REFUSED: usize = 8;
 
 /// Goes down from `place` by no more than `most_steps` tried steps, and leaves the best place there. Ends where a step without
-/// damping promises less than the share `least_gain` of the cost, where a step promises and gains less, or where none gains.
+/// damping promises less than a share of the cost, where a step promises and gains less, or where none gains. `least_gain` says the
+/// share for a cost.
 pub(super) fn descend(
     problem: &mut impl LeastSquares,
     place: &mut Place,
     most_steps: usize,
-    least_gain: f64,
+    least_gain: impl Fn(f64) -> f64,
 ) -> ControlFlow<()> {
     let mut model = Model::of(place);
     let mut damping = FIRST_DAMPING * place.longest();
     let (mut growth, mut refused) = (2.0, 0);
     for _ in 0..most_steps {
         let cost = place.cost();
+        let least_gain = least_gain(cost) * cost;
         let undamped = model.undamped_promise(&place.x, ROUNDING * ROUNDING * place.longest());
-        if undamped <= least_gain * cost || refused == MOST_REFUSED {
+        if undamped <= least_gain || refused == MOST_REFUSED {
             break;
         }
         let step = model.step(&place.x, damping);
@@ -76,7 +78,7 @@ pub(super) fn descend(
             let share = gain / step.promise;
             damping *= (1.0 - (2.0 * share - 1.0).powi(3)).max(1.0 / 3.0);
             (growth, refused) = (2.0, 0);
-            if gain.max(step.promise) <= least_gain * cost {
+            if gain.max(step.promise) <= least_gain {
                 break;
             }
         } else {
@@ -267,7 +269,7 @@ mod tests {
         let ControlFlow::Continue(Some(mut place)) = valley.place(start) else {
             panic!("nothing there");
         };
-        assert!(descend(&mut valley, &mut place, 100, 1e-8).is_continue());
+        assert!(descend(&mut valley, &mut place, 100, |_| 1e-8).is_continue());
         (valley.of(&place.x), place.cost(), valley.asked)
     }
 
@@ -310,7 +312,7 @@ mod tests {
             panic!("nothing there");
         };
         let before = place.cost();
-        assert!(descend(&mut broken, &mut place, 100, 1e-8).is_break());
+        assert!(descend(&mut broken, &mut place, 100, |_| 1e-8).is_break());
         assert!(place.cost() < before);
     }
 }

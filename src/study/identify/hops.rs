@@ -1,7 +1,7 @@
 //! Starts elsewhere after the polish: a lap can have minima that least squares does not leave, and least squares comes to the
 //! deepest from more than half of the starts that are the best of a thousand.
 
-use super::polish::{Polished, polish_observed};
+use super::polish::{Polished, polish_below};
 use super::setup::CHANNELS;
 use crate::error::Result;
 use crate::evaluate::replay::ReplayProblem;
@@ -33,7 +33,8 @@ pub(super) fn looks_like_noise(errors: &[f64]) -> bool {
     })
 }
 
-/// Polishes the best of the starts of hop number `hop`; `None` if none of them drives.
+/// Polishes the best of the starts of hop number `hop`, to the end if that comes to less than the cost `known`; `None` if none of the
+/// starts drives.
 ///
 /// # Errors
 /// Those of the evaluator.
@@ -41,6 +42,7 @@ pub(super) fn hop(
     replay: &ReplayProblem,
     evaluator: &mut dyn Evaluator,
     weights: [f64; CHANNELS],
+    known: f64,
     (seed, hop): (u64, usize),
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Option<Polished>> {
@@ -64,12 +66,24 @@ pub(super) fn hop(
         return Ok(None);
     }
     let start = seen.to_parameters(&starts[best * dimensions..(best + 1) * dimensions]);
-    Ok(polish_observed(replay, &start, weights, MOST_STEPS, watch))
+    Ok(polish_below(
+        gaining(known),
+        replay,
+        &start,
+        weights,
+        MOST_STEPS,
+        watch,
+    ))
+}
+
+/// The cost below which a hop counts, beside a minimum that is known.
+fn gaining(known: f64) -> f64 {
+    (1.0 - LEAST_GAIN) * known
 }
 
 /// Whether a polished hop is further down than the minimum that it began from.
 pub(super) fn gains(hopped: &Polished, cost: f64) -> bool {
-    hopped.cost < (1.0 - LEAST_GAIN) * cost
+    hopped.cost < gaining(cost)
 }
 
 #[cfg(test)]

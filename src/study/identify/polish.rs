@@ -21,6 +21,8 @@ pub struct Polished {
 /// A polish ends where least squares promises to gain less than this share of what one residual costs on the mean. A parameter that
 /// is off by a standard error costs as much as one residual, so this is what one costs that is off by a hundredth.
 const LEAST_GAIN: f64 = 1e-4;
+/// While a polish costs more than a minimum that is known, it ends where least squares promises less than this share of its cost.
+const LEAST_GAIN_ABOVE: f64 = 1e-5;
 /// Steps after which a polish that has not converged is left where it is. From what small swarms find, 30 to 50 lead to the minimum.
 pub(super) const MOST_STEPS: usize = 100;
 /// Drives that a step takes: two without derivatives, and one with them where it gains.
@@ -135,6 +137,18 @@ pub(super) fn polish_observed(
     most_steps: usize,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Polished> {
+    polish_below(f64::INFINITY, replay, candidate, weights, most_steps, watch)
+}
+
+/// As [`polish_observed`], to the end only where that comes to less than the cost `known` of a minimum that is known.
+pub(super) fn polish_below(
+    known: f64,
+    replay: &ReplayProblem,
+    candidate: &[f64],
+    weights: [f64; CHANNELS],
+    most_steps: usize,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Polished> {
     let scales: Vec<Scale> = replay.problem.variables.iter().map(Scale::of).collect();
     let shares = scales.iter().zip(candidate).map(|(scale, x)| scale.share(*x));
     let shares = DVector::from_iterator(scales.len(), shares);
@@ -147,7 +161,14 @@ pub(super) fn polish_observed(
     };
     let mut place = replays.place(shares).continue_value()??;
     replays.watch = watch;
-    let least_gain = LEAST_GAIN / place.errors.len().max(1) as f64;
+    let to_the_end = LEAST_GAIN / place.errors.len().max(1) as f64;
+    let least_gain = |cost: f64| {
+        if cost < known {
+            to_the_end
+        } else {
+            LEAST_GAIN_ABOVE
+        }
+    };
     let flow = descend(&mut replays, &mut place, most_steps, least_gain);
     Some(Polished {
         candidate: replays.candidate(&place.x),

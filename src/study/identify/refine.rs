@@ -75,7 +75,14 @@ pub(super) fn refine(
             }
             return Ok(refined);
         }
-        let hopped = hop(replay, evaluator, spread, (settings.seed, refined.hops), watch)?;
+        let hopped = hop(
+            replay,
+            evaluator,
+            spread,
+            cost,
+            (settings.seed, refined.hops),
+            watch,
+        )?;
         refined.hops += 1;
         if let Some(hopped) = hopped {
             refined.interrupted = hopped.interrupted;

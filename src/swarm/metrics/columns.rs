@@ -51,6 +51,16 @@ impl Columns {
         self.count = 0;
     }
 
+    /// The points without objective `k`.
+    pub fn without(&self, k: usize) -> Self {
+        let mut columns = self.clone();
+        for block in &mut columns.blocks {
+            block[k..].rotate_left(1);
+            block[COLUMNS - 1] = [0.0; WIDE];
+        }
+        columns
+    }
+
     #[inline(always)]
     fn point(&self, i: usize) -> Corner {
         let ([x, y, z, v, w], lane) = (&self.blocks[i / WIDE], i % WIDE);
@@ -65,6 +75,16 @@ impl Columns {
     /// that bites into the box takes what it alone dominates of the objectives before.
     pub fn exclusive(&self, i: usize, reference: &[f64]) -> f64 {
         let work = Exclusive {
+            columns: self,
+            i,
+            reference,
+        };
+        dispatch(InstructionSet::best(), work)
+    }
+
+    /// No less than [`Columns::exclusive`], in less time.
+    pub fn exclusive_at_most(&self, i: usize, reference: &[f64]) -> f64 {
+        let work = AtMost {
             columns: self,
             i,
             reference,
@@ -220,48 +240,43 @@ impl Columns {
         touched
     }
 
-    /// [`Columns::exclusive`] of more than three objectives; `exclusive` is the same for the last point, with those before the last.
+    /// Where the box from `own` to `end` ends at the latest: what is no worse in all objectives but one closes it in that one. Point
+    /// `but` is left out.
     #[inline(always)]
-    fn exclusive_by_sweep<const WIDTH: usize, const BEFORE: usize>(
+    fn closed<const WIDTH: usize>(&self, own: &Corner, but: usize, end: &Corner) -> Corner {
+        let mut end = *end;
+        for (number, block) in self.blocks.iter().enumerate() {
+            let low = counted::<WIDTH>(block, |k, x| x <= own[k]);
+            let mut closing = lanes(low, WIDTH - 1);
+            while let Some(lane) = next(&mut closing) {
+                if number * WIDE + lane == but {
+                    continue;
+                }
+                for k in 0..WIDTH {
+                    let x = block[k][lane];
+                    let closes = (x > own[k] || low[lane] == WIDTH as i64) && x < end[k];
+                    end[k] = if closes { x } else { end[k] };
+                }
+            }
+        }
+        end
+    }
+
+    /// [`Columns::exclusive`] of more than three objectives. `Last` is the same for the last point in the objectives before the last.
+    #[inline(always)]
+    fn exclusive_by_sweep<const WIDTH: usize, const BEFORE: usize, Last: LastExclusive>(
         &self,
         i: usize,
         reference: &[f64],
-        exclusive: impl Fn(&Columns, &[f64]) -> f64,
     ) -> f64 {
         let own = self.point(i);
         let mut end = own;
         end[..WIDTH].copy_from_slice(&reference[..WIDTH]);
-        // What is no worse in all objectives but one closes the box in that one.
-        let mut least = [[f64::INFINITY; WIDE]; WIDTH];
-        for (number, block) in self.blocks.iter().enumerate() {
-            for lane in 0..WIDE {
-                let mut closes = [number * WIDE + lane != i; WIDTH];
-                for k in 0..WIDTH {
-                    let low = block[k][lane] <= own[k];
-                    for (other, closes) in closes.iter_mut().enumerate() {
-                        *closes &= (k == other) | low;
-                    }
-                }
-                for k in 0..WIDTH {
-                    let found = if closes[k] { block[k][lane] } else { f64::INFINITY };
-                    least[k][lane] = if found < least[k][lane] {
-                        found
-                    } else {
-                        least[k][lane]
-                    };
-                }
-            }
+        let end = self.closed::<WIDTH>(&own, i, &end);
+        if (0..WIDTH).any(|k| own[k] >= end[k]) {
+            return 0.0;
         }
-        let mut volume = 1.0;
-        for k in 0..WIDTH {
-            for least in least[k] {
-                end[k] = if least < end[k] { least } else { end[k] };
-            }
-            if own[k] >= end[k] {
-                return 0.0;
-            }
-            volume *= end[k] - own[k];
-        }
+        let mut volume = room::<WIDTH>(&own, &end);
         let mut before = Columns::default();
         for (corner, _) in self.bites::<WIDTH>(own, i, end) {
             // What is covered changes nothing, not even how the sum is rounded.
@@ -269,23 +284,9 @@ impl Columns {
                 continue;
             }
             before.push(&corner[..BEFORE]);
-            volume -= (end[BEFORE] - corner[BEFORE]) * exclusive(&before, &end[..BEFORE]);
+            volume -= (end[BEFORE] - corner[BEFORE]) * Last::of(&before, &end[..BEFORE]);
         }
         volume.max(0.0)
-    }
-
-    #[inline(always)]
-    fn exclusive_of_four(&self, i: usize, reference: &[f64]) -> f64 {
-        self.exclusive_by_sweep::<4, 3>(i, reference, |before, end| {
-            before.exclusive_of_three(before.count - 1, end)
-        })
-    }
-
-    #[inline(always)]
-    fn exclusive_of_five(&self, i: usize, reference: &[f64]) -> f64 {
-        self.exclusive_by_sweep::<5, 4>(i, reference, |before, end| {
-            before.exclusive_of_four(before.count - 1, end)
-        })
     }
 
     #[inline(always)]
@@ -372,6 +373,71 @@ impl Columns {
     }
 }
 
+/// In how many of the first objectives each point of a block is as asked.
+#[inline(always)]
+fn counted<const WIDTH: usize>(block: &Block, is: impl Fn(usize, f64) -> bool) -> [i64; WIDE] {
+    let mut count = [0; WIDE];
+    for k in 0..WIDTH {
+        for lane in 0..WIDE {
+            count[lane] += i64::from(is(k, block[k][lane]));
+        }
+    }
+    count
+}
+
+/// The lanes of at least so many, one bit each.
+#[inline(always)]
+fn lanes(count: [i64; WIDE], least: usize) -> u32 {
+    let mut lanes = 0;
+    for lane in 0..WIDE {
+        lanes |= u32::from(count[lane] >= least as i64) << lane;
+    }
+    lanes
+}
+
+/// Takes the first lane of some.
+#[inline(always)]
+fn next(lanes: &mut u32) -> Option<usize> {
+    let lane = (*lanes != 0).then(|| lanes.trailing_zeros() as usize)?;
+    *lanes &= *lanes - 1;
+    Some(lane)
+}
+
+/// The volume of the box from `corner` to `end`.
+#[inline(always)]
+fn room<const WIDTH: usize>(corner: &Corner, end: &Corner) -> f64 {
+    let mut room = 1.0;
+    for k in 0..WIDTH {
+        room *= end[k] - corner[k];
+    }
+    room
+}
+
+/// What the last point alone dominates. Closures would not be compiled for the instruction set of what calls them.
+trait LastExclusive {
+    fn of(columns: &Columns, reference: &[f64]) -> f64;
+}
+
+/// In up to three objectives.
+struct OfThree;
+
+/// In four.
+struct OfFour;
+
+impl LastExclusive for OfThree {
+    #[inline(always)]
+    fn of(columns: &Columns, reference: &[f64]) -> f64 {
+        columns.exclusive_of_three(columns.count - 1, reference)
+    }
+}
+
+impl LastExclusive for OfFour {
+    #[inline(always)]
+    fn of(columns: &Columns, reference: &[f64]) -> f64 {
+        columns.exclusive_by_sweep::<4, 3, OfThree>(columns.count - 1, reference)
+    }
+}
+
 /// [`Columns::exclusive`], compiled for each instruction set.
 struct Exclusive<'a> {
     columns: &'a Columns,
@@ -385,9 +451,50 @@ impl LaneWork for Exclusive<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> f64 {
         match self.reference.len() {
-            5 => self.columns.exclusive_of_five(self.i, self.reference),
-            4 => self.columns.exclusive_of_four(self.i, self.reference),
+            5 => self
+                .columns
+                .exclusive_by_sweep::<5, 4, OfFour>(self.i, self.reference),
+            4 => self
+                .columns
+                .exclusive_by_sweep::<4, 3, OfThree>(self.i, self.reference),
             _ => self.columns.exclusive_of_three(self.i, self.reference),
+        }
+    }
+}
+
+/// [`Columns::exclusive_at_most`], compiled for each instruction set.
+struct AtMost<'a> {
+    columns: &'a Columns,
+    i: usize,
+    reference: &'a [f64],
+}
+
+impl AtMost<'_> {
+    #[inline(always)]
+    fn closed<const WIDTH: usize>(&self) -> f64 {
+        let own = self.columns.point(self.i);
+        let mut end = own;
+        for k in 0..WIDTH {
+            end[k] = self.reference.get(k).copied().unwrap_or(1.0);
+        }
+        let end = self.columns.closed::<WIDTH>(&own, self.i, &end);
+        let mut room = 1.0;
+        for k in 0..WIDTH {
+            room *= if own[k] < end[k] { end[k] - own[k] } else { 0.0 };
+        }
+        room
+    }
+}
+
+impl LaneWork for AtMost<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> f64 {
+        match self.reference.len() {
+            5 => self.closed::<5>(),
+            4 => self.closed::<4>(),
+            _ => self.closed::<3>(),
         }
     }
 }

@@ -85,7 +85,8 @@ mod tests {
         }
     }
 
-    /// What comes or leaves touches exactly the shares that change, by no more than is said; on a curve its neighbours'.
+    /// What comes or leaves touches exactly the shares that change, by no more than is said; on a curve its neighbours'. No share
+    /// is more than it is at the most.
     #[test]
     fn touches_what_changes() {
         let random = Random::new(6);
@@ -103,6 +104,9 @@ mod tests {
             let reference = vec![0.875; width];
             let (last, rest) = points.split_last().unwrap();
             let share = |points: &[Vec<f64>], i: usize| columns(points).exclusive(i, &reference);
+            for i in 0..points.len() {
+                assert!(columns(&points).exclusive_at_most(i, &reference) >= share(&points, i));
+            }
             let changes = |i: usize| (share(rest, i) - share(&points, i)).abs();
             for (points, came) in [(points.as_slice(), Some(rest.len())), (rest, None)] {
                 let touched = columns(points).touched(last, came, &reference);

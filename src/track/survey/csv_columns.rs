@@ -8,6 +8,7 @@ use super::{MOST_POINTS, Raw, WIDEST_M};
 use crate::config::cells;
 use crate::{Error, Place, Result};
 use glam::DVec2;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// One edge of a road: its points, and the lines of the file they stand on.
@@ -84,7 +85,6 @@ fn shown(cell: &str) -> String {
 
 struct Table<'a> {
     path: &'a Path,
-    separator: char,
     header: Vec<(usize, Column)>,
     width: usize,
 }
@@ -102,13 +102,9 @@ impl Table<'_> {
 /// The columns of a header line, or nothing if none is known.
 fn header<'a>(line: &str, number: usize, path: &'a Path) -> Result<Option<Table<'a>>> {
     let text = line.trim_start_matches('#').trim();
-    let separator = [',', ';', '\t']
-        .into_iter()
-        .find(|&s| text.contains(s))
-        .unwrap_or(',');
     let mut header: Vec<(usize, Column)> = Vec::new();
     let mut width = 0;
-    for (i, cell) in cells(text, separator).enumerate() {
+    for (i, cell) in cells(text).iter().enumerate() {
         width = i + 1;
         let name = cell.to_lowercase();
         let Some(&(_, column)) = NAMES.iter().find(|(known, _)| *known == name) else {
@@ -124,12 +120,7 @@ fn header<'a>(line: &str, number: usize, path: &'a Path) -> Result<Option<Table<
         }
         header.push((i, column));
     }
-    let table = Table {
-        path,
-        separator,
-        header,
-        width,
-    };
+    let table = Table { path, header, width };
     Ok((!table.header.is_empty()).then_some(table))
 }
 
@@ -191,8 +182,8 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Content> {
 }
 
 /// The cells of a row, as many as the header has.
-fn row<'a>(table: &Table<'_>, number: usize, line: &'a str) -> Result<Vec<&'a str>> {
-    let found: Vec<&str> = cells(line, table.separator).collect();
+fn row<'a>(table: &Table<'_>, number: usize, line: &'a str) -> Result<Vec<Cow<'a, str>>> {
+    let found = cells(line);
     let surplus = found.iter().skip(table.width).any(|cell| !cell.is_empty());
     if found.len() < table.width || surplus {
         return Err(Error::input(
@@ -205,7 +196,14 @@ fn row<'a>(table: &Table<'_>, number: usize, line: &'a str) -> Result<Vec<&'a st
     Ok(found)
 }
 
-fn number(table: &Table<'_>, line: usize, cells: &[&str], at: usize, low: f64, high: f64) -> Result<f64> {
+fn number(
+    table: &Table<'_>,
+    line: usize,
+    cells: &[Cow<'_, str>],
+    at: usize,
+    low: f64,
+    high: f64,
+) -> Result<f64> {
     match cells[at].parse::<f64>() {
         Ok(x) if x >= low && x <= high => Ok(x),
         _ => {
@@ -216,7 +214,7 @@ fn number(table: &Table<'_>, line: usize, cells: &[&str], at: usize, low: f64, h
             Err(Error::input(
                 table.path,
                 Place::line(line).named(format!("column {} ({name})", at + 1)),
-                shown(cells[at]),
+                shown(&cells[at]),
                 format!("a number from {low} to {high}"),
             ))
         }

@@ -29,7 +29,7 @@ mod xml;
 use super::circuit::{Corner, Section};
 use super::friction::FRICTION_PLACES;
 use super::relief::Given;
-use crate::config::read_bytes;
+use crate::config::{read_bytes, with_commas};
 use crate::{Error, Place, Result};
 use glam::DVec2;
 use std::path::Path;
@@ -132,7 +132,7 @@ impl Survey {
         let raw = if text.trim_start().starts_with('<') {
             xml::read(text, path)?
         } else {
-            match csv_columns::read(text, path)? {
+            match csv_columns::read(&with_commas(text), path)? {
                 csv_columns::Content::Line(raw) => raw,
                 csv_columns::Content::Edges { left, right } => {
                     return boundaries::survey(&left, &right, path, options);

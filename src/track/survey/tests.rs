@@ -137,8 +137,15 @@ fn the_racetrack_database_is_read() {
     let first = racetrack().lines().nth(1).unwrap().to_owned();
     let other = format!("\u{feff}{}\n# on\n\n{first}\n", &racetrack()[2..]).replace(',', "; ");
     let again = parse(&other, "oval.csv", &options).unwrap();
-    assert_eq!((again.centre_m, again.left_m), (survey.centre_m, survey.left_m));
+    assert_eq!(
+        (&again.centre_m, &again.left_m),
+        (&survey.centre_m, &survey.left_m)
+    );
     assert_eq!(again.lines.len(), 60);
+    // As a spreadsheet writes it where numbers have decimal commas.
+    let commas = racetrack().replace(',', ";").replace('.', ",");
+    let again = parse(&commas, "oval.csv", &options).unwrap();
+    assert_eq!((again.centre_m, again.left_m), (survey.centre_m, survey.left_m));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::{
     BendTraction, ENVELOPE_COLUMNS, Envelope, EnvelopeRow, LOST_COLUMN, OPEN_COLUMN, TRACTION_COLUMN,
     check_count, check_losses, check_row, check_shares, check_traction, in_list,
 };
-use crate::config::read_text;
+use crate::config::{read_text, with_commas};
 use crate::error::{Error, Place, Result};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -26,7 +26,7 @@ impl Envelope {
     /// # Errors
     /// As [`Envelope::load`].
     pub fn from_csv(file: &str, text: &str) -> Result<Self> {
-        let text = text.trim_start_matches('\u{feff}');
+        let text = with_commas(text.trim_start_matches('\u{feff}'));
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)

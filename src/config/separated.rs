@@ -1,0 +1,153 @@
+//! Tables in text: cells between commas, semicolons or tabs, numbers with a decimal point or comma.
+
+use std::borrow::Cow;
+
+/// Lines at the start of a text that say what separates its cells.
+const LINES_ASKED: usize = 64;
+
+/// A table with commas between its cells and points in its numbers, for readers that know no others. Semicolons and tabs between cells
+/// become commas, and a number such as `12,5` between them `12.5`. Lines keep their numbers.
+pub(crate) fn with_commas(text: &str) -> Cow<'_, str> {
+    let separator = separator(text);
+    if separator == ',' {
+        return Cow::Borrowed(text);
+    }
+    let mut table = String::with_capacity(text.len() + text.len() / 8);
+    // A quoted cell may go on in the next line.
+    let mut quoted = false;
+    for line in text.split_inclusive('\n') {
+        let body = line.trim_end_matches(['\r', '\n']);
+        let comment = !quoted && body.starts_with('#');
+        // A comment must still begin like one.
+        let mut continued = quoted || comment;
+        let mut start = 0;
+        for (at, c) in body.char_indices() {
+            quoted ^= c == '"';
+            if c == separator && !quoted {
+                push_cell(&mut table, &body[start..at], continued);
+                table.push(',');
+                (start, continued) = (at + 1, comment);
+            }
+        }
+        push_cell(&mut table, &body[start..], continued || quoted);
+        table.push_str(&line[body.len()..]);
+        // A mark in a comment is no quotation.
+        quoted &= !comment;
+    }
+    Cow::Owned(table)
+}
+
+/// What separates the cells: a semicolon or a tab if most of the first lines have it, and the first of these fewer commas.
+fn separator(text: &str) -> char {
+    let lines = || {
+        let written = text.lines().filter(|line| !line.trim().is_empty());
+        written.take(LINES_ASKED)
+    };
+    let separates = |separator: &char| {
+        let count = |line: &str, sought: char| {
+            let mut quoted = false;
+            let outside = |c: &char| {
+                quoted ^= *c == '"';
+                !quoted && *c == sought
+            };
+            line.chars().filter(outside).count()
+        };
+        let mut with = lines().filter(|line| count(line, *separator) > 0);
+        let Some(first) = with.next() else {
+            return false;
+        };
+        count(first, *separator) > count(first, ',') && 2 * (1 + with.count()) > lines().count()
+    };
+    [';', '\t'].into_iter().find(separates).unwrap_or(',')
+}
+
+/// Writes a cell; `part` of one that goes on over lines stays as it is.
+fn push_cell(table: &mut String, cell: &str, part: bool) {
+    let bare = cell.trim();
+    if part || bare.starts_with('"') && bare.len() > 1 || !cell.contains(',') {
+        table.push_str(cell);
+    } else if is_number(bare) {
+        table.push_str(&bare.replace(',', "."));
+    } else {
+        table.push('"');
+        table.push_str(&bare.replace('"', "\"\""));
+        table.push('"');
+    }
+}
+
+/// Whether a cell is a number with a decimal comma.
+fn is_number(cell: &str) -> bool {
+    let digits = cell.trim_start_matches(['+', '-']);
+    digits.starts_with(|c: char| c.is_ascii_digit() || c == ',')
+        && digits.matches(',').count() == 1
+        && !digits.contains('.')
+        && digits.replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// The cells of a line between commas, without the quotation marks and spaces round them.
+pub(crate) fn cells(line: &str) -> Vec<Cow<'_, str>> {
+    let mut cells = Vec::new();
+    let mut start = 0;
+    let mut quoted = false;
+    for (at, byte) in line.bytes().enumerate() {
+        match byte {
+            b'"' => quoted = !quoted,
+            b',' if !quoted => {
+                cells.push(unquoted(&line[start..at]));
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    cells.push(unquoted(&line[start..]));
+    cells
+}
+
+fn unquoted(cell: &str) -> Cow<'_, str> {
+    let cell = cell.trim();
+    match cell.strip_prefix('"').and_then(|c| c.strip_suffix('"')) {
+        Some(inner) if inner.contains("\"\"") => Cow::Owned(inner.replace("\"\"", "\"").trim().to_owned()),
+        Some(inner) => Cow::Borrowed(inner.trim()),
+        None => Cow::Borrowed(cell),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn semicolons_tabs_and_decimal_commas_become_commas_and_points() {
+        for (text, expected) in [
+            ("a;b\r\n1,5;-2,25\r\n3;4e-1\n", "a,b\r\n1.5,-2.25\r\n3,4e-1\n"),
+            ("a\tb\n1,5E-3\t,5\n", "a,b\n1.5E-3,.5\n"),
+            // A title, a comment with a mark, words and dates with commas, and a quoted cell over two lines.
+            (
+                "Monza, wet\n# 13\" rims, dry\nt;x\n1,5;one, two\n2,0;\"a;\nb\"\n3;1,234,5\n",
+                "\"Monza, wet\"\n# 13\" rims, dry\nt,x\n1.5,\"one, two\"\n2.0,\"a;\nb\"\n3,\"1,234,5\"\n",
+            ),
+            ("a; b\n1.5; 2\n", "a, b\n1.5, 2\n"),
+        ] {
+            assert_eq!(with_commas(text), expected);
+        }
+    }
+
+    #[test]
+    fn a_table_with_commas_stays_as_it_is() {
+        for text in [
+            "a,b\n1,2\n",
+            "\"Comment\",\"one; two\"\n\"x\",\"y\"\n1,2\n",
+            "a, b; c\n1,2\n3,4\n",
+            "a,\tb,\tc\n1,\t2,\t3\n",
+            "a\n1\n",
+            "",
+        ] {
+            assert!(matches!(with_commas(text), Cow::Borrowed(_)), "{text}");
+        }
+    }
+
+    #[test]
+    fn cells_lose_their_quotation_marks() {
+        assert_eq!(cells(" a, \"b, \"\"c\"\"\" ,\"d\""), ["a", "b, \"c\"", "d"]);
+    }
+}
