@@ -17,7 +17,7 @@ pub use document::{Document, Table};
 #[cfg(feature = "vehicle")]
 pub(crate) use document::{line_of, refused};
 #[cfg(feature = "vehicle")]
-pub(crate) use separated::{cells, with_commas};
+pub(crate) use separated::{Rows, cells, with_commas};
 
 use crate::error::{Error, Place, Result};
 use std::cell::RefCell;

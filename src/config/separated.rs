@@ -1,6 +1,55 @@
 //! Tables in text: cells between commas, semicolons or tabs, numbers with a decimal point or comma.
 
+use super::line_of;
+use crate::error::{Error, Place, Result};
 use std::borrow::Cow;
+
+/// The rows of a table as wide as its header, each with its line.
+pub(crate) struct Rows {
+    pub header: (usize, csv::StringRecord),
+    pub records: Vec<(usize, csv::StringRecord)>,
+}
+
+impl Rows {
+    /// Reads a text; lines that begin with `#` are comments. `file` is what errors call it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the line of a row that is no row of the header's width.
+    pub fn of(file: &str, text: &str) -> Result<Self> {
+        let text = with_commas(text.trim_start_matches('\u{feff}'));
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        // The reader counts lines from before the comments and empty lines that it skips.
+        let line_at = |position: Option<&csv::Position>| {
+            let start = position.map_or(0, |p| p.byte() as usize).min(text.len());
+            let skipped = text.as_bytes()[start..]
+                .split(|&b| b == b'\n')
+                .take_while(|line| line.trim_ascii().is_empty() || line.starts_with(b"#"))
+                .count();
+            line_of(&text, start) + skipped
+        };
+        let unreadable = |error: csv::Error| {
+            let found = match error.kind() {
+                csv::ErrorKind::UnequalLengths {
+                    expected_len, len, ..
+                } => format!("{len} fields where the header has {expected_len}"),
+                _ => error.to_string(),
+            };
+            let place = Place::line(line_at(error.position()));
+            Error::input(file, place, found, "a row like the header")
+        };
+        let header = reader.headers().map_err(unreadable)?.clone();
+        let mut records = Vec::new();
+        let header = (line_at(header.position()), header);
+        for record in reader.records() {
+            let record = record.map_err(unreadable)?;
+            records.push((line_at(record.position()), record));
+        }
+        Ok(Self { header, records })
+    }
+}
 
 /// Lines at the start of a text that say what separates its cells.
 const LINES_ASKED: usize = 64;

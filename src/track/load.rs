@@ -14,7 +14,7 @@ use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::relief::{Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG, between_edges};
 use super::survey::{Survey, SurveyOptions};
-use crate::config::{folder_of, line_of, read_text, with_commas};
+use crate::config::{Rows, folder_of, line_of, read_text};
 use crate::{Error, Place, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
@@ -272,16 +272,6 @@ const COLUMNS: [&str; 13] = [
     FRICTION_NAMES[4],
 ];
 
-/// The line of the row at this position. The reader's own count is that of the comments and empty lines before the row.
-fn row_line(text: &str, position: Option<&csv::Position>) -> usize {
-    let start = position.map_or(0, |p| p.byte() as usize).min(text.len());
-    let skipped = text.as_bytes()[start..]
-        .split(|&b| b == b'\n')
-        .take_while(|line| line.trim_ascii().is_empty() || line.starts_with(b"#"))
-        .count();
-    line_of(text, start) + skipped
-}
-
 fn parse_table(
     file: &str,
     text: &str,
@@ -289,24 +279,10 @@ fn parse_table(
     closed: bool,
     width_m: Option<f64>,
 ) -> Result<(Vec<CurvatureRow>, Given)> {
-    let text = &with_commas(text.trim_start_matches('\u{feff}'));
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let line_at = |position: Option<&csv::Position>| row_line(text, position);
-    let unreadable = |error: csv::Error| {
-        let line = line_at(error.position());
-        let found = match error.kind() {
-            csv::ErrorKind::UnequalLengths {
-                expected_len, len, ..
-            } => format!("{len} fields where the header has {expected_len}"),
-            _ => error.to_string(),
-        };
-        Error::input(file, Place::line(line), found, "a row like the header")
-    };
-    let header = reader.headers().map_err(unreadable)?.clone();
-    let header_line = line_at(header.position());
+    let Rows {
+        header: (header_line, header),
+        records,
+    } = Rows::of(file, text)?;
     let mut column = [None; COLUMNS.len()];
     for (i, found) in header.iter().enumerate() {
         match COLUMNS.iter().position(|&c| c == found) {
@@ -349,9 +325,7 @@ fn parse_table(
 
     let mut rows: Vec<CurvatureRow> = Vec::new();
     let mut given = Given::default();
-    for record in reader.records() {
-        let record = record.map_err(unreadable)?;
-        let line = line_at(record.position());
+    for (line, record) in records {
         let number = |column: usize, (low, high): (f64, f64)| -> Result<f64> {
             let found = record.get(column).unwrap_or_default();
             match found.parse::<f64>() {

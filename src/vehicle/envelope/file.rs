@@ -4,7 +4,7 @@ use super::{
     BendTraction, ENVELOPE_COLUMNS, Envelope, EnvelopeRow, LOST_COLUMN, OPEN_COLUMN, TRACTION_COLUMN,
     check_count, check_losses, check_row, check_shares, check_traction, in_list,
 };
-use crate::config::{read_text, with_commas};
+use crate::config::{Rows, read_text};
 use crate::error::{Error, Place, Result};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -26,44 +26,14 @@ impl Envelope {
     /// # Errors
     /// As [`Envelope::load`].
     pub fn from_csv(file: &str, text: &str) -> Result<Self> {
-        let text = with_commas(text.trim_start_matches('\u{feff}'));
-        let mut reader = csv::ReaderBuilder::new()
-            .comment(Some(b'#'))
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        // The reader counts lines from before the comments and empty lines that it skips.
-        let line_at = |position: Option<&csv::Position>| {
-            let start = position.map_or(0, |p| p.byte() as usize).min(text.len());
-            let skipped = text.as_bytes()[start..]
-                .split(|&b| b == b'\n')
-                .take_while(|line| line.trim_ascii().is_empty() || line.starts_with(b"#"))
-                .count();
-            1 + text.bytes().take(start).filter(|&b| b == b'\n').count() + skipped
-        };
-        let unreadable = |error: csv::Error| {
-            let found = match error.kind() {
-                csv::ErrorKind::UnequalLengths {
-                    expected_len, len, ..
-                } => format!("{len} fields where the header has {expected_len}"),
-                _ => error.to_string(),
-            };
-            let place = Place::line(line_at(error.position()));
-            Error::input(file, place, found, "a row like the header")
-        };
-        let header = reader.headers().map_err(unreadable)?.clone();
-        let header_line = line_at(header.position());
-        let mut records = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(unreadable)?;
-            records.push((line_at(record.position()), record));
-        }
+        let Rows { header, records } = Rows::of(file, text)?;
         let table = TableText {
             file,
-            header: (header_line, &header),
+            header: (header.0, &header.1),
             records: &records,
         };
         let shut = table.envelope("")?;
-        if header.iter().any(|name| name.starts_with(OPEN_COLUMN)) {
+        if header.1.iter().any(|name| name.starts_with(OPEN_COLUMN)) {
             return shut.with_open(table.envelope(OPEN_COLUMN)?);
         }
         Ok(shut)
