@@ -6,12 +6,14 @@
 use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, Throughput};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator};
+use lapswarm::minimise_several;
 use lapswarm::random::Random;
 use lapswarm::swarm::metrics::{contributions, hypervolume, non_dominated, ranks};
 use lapswarm::swarm::problems::{SimdTestEvaluator, TestProblem};
 use lapswarm::swarm::{
     Archive, Mopso, MopsoSettings, Nsga2, Nsga2Settings, Optimiser, PsoSettings, Truncation,
 };
+use std::f64::consts::PI;
 use std::time::Duration;
 
 /// Variables of the problems.
@@ -156,9 +158,53 @@ fn metrics(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// A sphere that the swarm comes to at once, so that its archive is full of a front (DTLZ2), and one behind many others (DTLZ1), whose
+/// extremes move with every generation. Deb, Thiele, Laumanns, Zitzler, Scalable test problems, 2005.
+fn dtlz(far: bool, x: &[f64], objectives: &mut [f64]) {
+    let count = objectives.len();
+    let (places, distances) = x.split_at(count - 1);
+    let g: f64 = if far {
+        let each = |x: &f64| (x - 0.5).powi(2) - (20.0 * PI * (x - 0.5)).cos();
+        100.0 * (distances.len() as f64 + distances.iter().map(each).sum::<f64>())
+    } else {
+        distances.iter().map(|x| (x - 0.5).powi(2)).sum()
+    };
+    let (along, across): (fn(f64) -> f64, fn(f64) -> f64) = if far {
+        (|x| x, |x| 1.0 - x)
+    } else {
+        (|x| (0.5 * PI * x).cos(), |x| (0.5 * PI * x).sin())
+    };
+    for (i, objective) in objectives.iter_mut().enumerate() {
+        let before: f64 = places[..count - 1 - i].iter().map(|x| along(*x)).product();
+        let last = if i > 0 { across(places[count - 1 - i]) } else { 1.0 };
+        *objective = (1.0 + g) * before * last;
+    }
+}
+
+/// The default's 25,000 evaluations, by the number of objectives. With four and more nearly all of the time is the archive's.
+fn runs(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("25,000 evaluations");
+    group
+        .sampling_mode(SamplingMode::Flat)
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_secs(2));
+    let quick = std::env::var("LAPSWARM_BENCH_QUICK").is_ok_and(|x| x == "1");
+    for (name, far) in [("dtlz1", true), ("dtlz2", false)] {
+        for objectives in if quick { 2..=3 } else { 2..=5 } {
+            group.bench_function(BenchmarkId::new(name, objectives), |bencher| {
+                let bounds = vec![(0.0, 1.0); objectives + 9];
+                bencher.iter(|| minimise_several(&bounds, objectives, |x, f| dtlz(far, x, f)).run());
+            });
+        }
+    }
+    group.finish();
+}
+
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     generations(&mut criterion);
+    runs(&mut criterion);
     metrics(&mut criterion);
     criterion.final_summary();
 }

@@ -14,7 +14,7 @@ use super::from_curvature::{Closure, CurvatureRow, CurvatureTable};
 use super::reference::Smoothing;
 use super::relief::{Given, HEIGHTS_M, Relief, ReliefChange, STEEPEST_BANK_DEG, between_edges};
 use super::survey::{Survey, SurveyOptions};
-use crate::config::{Rows, folder_of, line_of, read_text};
+use crate::config::{Rows, folder_of, read_text};
 use crate::{Error, Place, Result};
 
 /// A circuit embedded in the crate: name, TOML and curvature table.
