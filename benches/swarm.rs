@@ -169,13 +169,10 @@ fn dtlz(far: bool, x: &[f64], objectives: &mut [f64]) {
     } else {
         distances.iter().map(|x| (x - 0.5).powi(2)).sum()
     };
-    let (along, across): (fn(f64) -> f64, fn(f64) -> f64) = if far {
-        (|x| x, |x| 1.0 - x)
-    } else {
-        (|x| (0.5 * PI * x).cos(), |x| (0.5 * PI * x).sin())
-    };
+    let along = |x: f64| if far { x } else { (0.5 * PI * x).cos() };
+    let across = |x: f64| if far { 1.0 - x } else { (0.5 * PI * x).sin() };
     for (i, objective) in objectives.iter_mut().enumerate() {
-        let before: f64 = places[..count - 1 - i].iter().map(|x| along(*x)).product();
+        let before: f64 = places[..count - 1 - i].iter().copied().map(along).product();
         let last = if i > 0 { across(places[count - 1 - i]) } else { 1.0 };
         *objective = (1.0 + g) * before * last;
     }

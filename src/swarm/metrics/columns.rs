@@ -377,9 +377,9 @@ impl Columns {
 #[inline(always)]
 fn counted<const WIDTH: usize>(block: &Block, is: impl Fn(usize, f64) -> bool) -> [i64; WIDE] {
     let mut count = [0; WIDE];
-    for k in 0..WIDTH {
-        for lane in 0..WIDE {
-            count[lane] += i64::from(is(k, block[k][lane]));
+    for (k, values) in block.iter().take(WIDTH).enumerate() {
+        for (count, x) in count.iter_mut().zip(values) {
+            *count += i64::from(is(k, *x));
         }
     }
     count
@@ -389,8 +389,8 @@ fn counted<const WIDTH: usize>(block: &Block, is: impl Fn(usize, f64) -> bool) -
 #[inline(always)]
 fn lanes(count: [i64; WIDE], least: usize) -> u32 {
     let mut lanes = 0;
-    for lane in 0..WIDE {
-        lanes |= u32::from(count[lane] >= least as i64) << lane;
+    for (lane, count) in count.into_iter().enumerate() {
+        lanes |= u32::from(count >= least as i64) << lane;
     }
     lanes
 }
@@ -474,8 +474,8 @@ impl AtMost<'_> {
     fn closed<const WIDTH: usize>(&self) -> f64 {
         let own = self.columns.point(self.i);
         let mut end = own;
-        for k in 0..WIDTH {
-            end[k] = self.reference.get(k).copied().unwrap_or(1.0);
+        for (k, end) in end.iter_mut().take(WIDTH).enumerate() {
+            *end = self.reference.get(k).copied().unwrap_or(1.0);
         }
         let end = self.columns.closed::<WIDTH>(&own, self.i, &end);
         let mut room = 1.0;
