@@ -3,7 +3,8 @@
 //!
 //! `LAPSWARM_BENCH_QUICK=1` leaves out the largest for continuous integration.
 
-use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, Throughput};
+use criterion::measurement::WallTime;
+use criterion::{BatchSize, BenchmarkGroup, BenchmarkId, Criterion, SamplingMode, Throughput};
 use lapswarm::evaluate::simd::InstructionSet;
 use lapswarm::evaluate::{Evaluation, Evaluator};
 use lapswarm::minimise_several;
@@ -32,6 +33,17 @@ fn problems() -> [TestProblem; 2] {
     ["zdt1", "dtlz2"].map(|name| TestProblem::sized(name, VARIABLES).expect("known"))
 }
 
+/// A group of few samples, since each takes long.
+fn group<'a>(criterion: &'a mut Criterion, name: &str) -> BenchmarkGroup<'a, WallTime> {
+    let mut group = criterion.benchmark_group(name);
+    group
+        .sampling_mode(SamplingMode::Flat)
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_secs(2));
+    group
+}
+
 /// An optimiser in its stride, and what it is told next.
 fn in_stride<T: Optimiser>(mut optimiser: T, problem: &TestProblem) -> (T, Evaluation) {
     let mut evaluator = SimdTestEvaluator::new(problem, InstructionSet::best());
@@ -46,12 +58,7 @@ fn in_stride<T: Optimiser>(mut optimiser: T, problem: &TestProblem) -> (T, Evalu
 }
 
 fn generations(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("generation");
-    group
-        .sampling_mode(SamplingMode::Flat)
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(100))
-        .measurement_time(Duration::from_secs(2));
+    let mut group = group(criterion, "generation");
     for problem in problems() {
         let objectives = problem.problem().objectives.len();
         for population in populations() {
@@ -109,12 +116,7 @@ fn sphere(count: usize, width: usize) -> Vec<Vec<f64>> {
 }
 
 fn metrics(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("metrics");
-    group
-        .sampling_mode(SamplingMode::Flat)
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(100))
-        .measurement_time(Duration::from_secs(2));
+    let mut group = group(criterion, "metrics");
     for width in [2, 3] {
         for count in populations() {
             group.throughput(Throughput::Elements(count as u64));
@@ -158,8 +160,8 @@ fn metrics(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A sphere that the swarm comes to at once, so that its archive is full of a front (DTLZ2), and one behind many others (DTLZ1), whose
-/// extremes move with every generation. Deb, Thiele, Laumanns, Zitzler, Scalable test problems, 2005.
+/// DTLZ2, to whose front the swarm comes at once, so that its archive is full of it; `far` from its front DTLZ1, whose extremes move for
+/// long. Deb, Thiele, Laumanns, Zitzler, Scalable test problems for evolutionary multiobjective optimization, 2005.
 fn dtlz(far: bool, x: &[f64], objectives: &mut [f64]) {
     let count = objectives.len();
     let (places, distances) = x.split_at(count - 1);
@@ -180,12 +182,7 @@ fn dtlz(far: bool, x: &[f64], objectives: &mut [f64]) {
 
 /// The default's 25,000 evaluations, by the number of objectives. With four and more nearly all of the time is the archive's.
 fn runs(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("25,000 evaluations");
-    group
-        .sampling_mode(SamplingMode::Flat)
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(100))
-        .measurement_time(Duration::from_secs(2));
+    let mut group = group(criterion, "25,000 evaluations");
     let quick = std::env::var("LAPSWARM_BENCH_QUICK").is_ok_and(|x| x == "1");
     for (name, far) in [("dtlz1", true), ("dtlz2", false)] {
         for objectives in if quick { 2..=3 } else { 2..=5 } {

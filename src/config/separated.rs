@@ -51,8 +51,8 @@ impl Rows {
     }
 }
 
-/// Lines at the start of a text that say what separates its cells.
-const LINES_ASKED: usize = 64;
+/// Rows at the start of a text that say what separates its cells.
+const ROWS_ASKED: usize = 64;
 
 /// A table with commas between its cells and points in its numbers, for readers that know no others. Semicolons and tabs between cells
 /// become commas, and a number such as `12,5` between them `12.5`. Lines keep their numbers.
@@ -67,18 +67,18 @@ pub(crate) fn with_commas(text: &str) -> Cow<'_, str> {
     for line in text.split_inclusive('\n') {
         let body = line.trim_end_matches(['\r', '\n']);
         let comment = !quoted && body.starts_with('#');
-        // A comment must still begin like one.
-        let mut continued = quoted || comment;
+        // What goes on from the line before stays as it is, and a comment must still begin like one.
+        let mut as_it_is = quoted || comment;
         let mut start = 0;
         for (at, c) in body.char_indices() {
             quoted ^= c == '"';
             if c == separator && !quoted {
-                push_cell(&mut table, &body[start..at], continued);
+                push_cell(&mut table, &body[start..at], as_it_is);
                 table.push(',');
-                (start, continued) = (at + 1, comment);
+                (start, as_it_is) = (at + 1, comment);
             }
         }
-        push_cell(&mut table, &body[start..], continued || quoted);
+        push_cell(&mut table, &body[start..], as_it_is || quoted);
         table.push_str(&line[body.len()..]);
         // A mark in a comment is no quotation.
         quoted &= !comment;
@@ -86,34 +86,40 @@ pub(crate) fn with_commas(text: &str) -> Cow<'_, str> {
     Cow::Owned(table)
 }
 
-/// What separates the cells: a semicolon or a tab if most of the first lines have it, and the first of these fewer commas.
+/// What separates the cells: a semicolon or a tab if most of the first rows have it, and the first of these, or a comment before it, has
+/// fewer commas.
 fn separator(text: &str) -> char {
-    let lines = || {
-        let written = text.lines().filter(|line| !line.trim().is_empty());
-        written.take(LINES_ASKED)
+    let count = |line: &str, sought: char| {
+        let mut quoted = false;
+        let outside = |c: &char| {
+            quoted ^= *c == '"';
+            !quoted && *c == sought
+        };
+        line.chars().filter(outside).count()
     };
     let separates = |separator: &char| {
-        let count = |line: &str, sought: char| {
-            let mut quoted = false;
-            let outside = |c: &char| {
-                quoted ^= *c == '"';
-                !quoted && *c == sought
-            };
-            line.chars().filter(outside).count()
-        };
-        let mut with = lines().filter(|line| count(line, *separator) > 0);
-        let Some(first) = with.next() else {
-            return false;
-        };
-        count(first, *separator) > count(first, ',') && 2 * (1 + with.count()) > lines().count()
+        let (mut rows, mut with, mut heads) = (0, 0, false);
+        for line in text.lines().filter(|line| !line.trim().is_empty()) {
+            let found = count(line, *separator);
+            heads |= with == 0 && found > count(line, ',');
+            if line.starts_with('#') {
+                continue;
+            }
+            rows += 1;
+            with += usize::from(found > 0);
+            if rows == ROWS_ASKED {
+                break;
+            }
+        }
+        heads && 2 * with > rows
     };
     [';', '\t'].into_iter().find(separates).unwrap_or(',')
 }
 
-/// Writes a cell; `part` of one that goes on over lines stays as it is.
-fn push_cell(table: &mut String, cell: &str, part: bool) {
+/// Writes a cell, `as_it_is` or with a decimal point.
+fn push_cell(table: &mut String, cell: &str, as_it_is: bool) {
     let bare = cell.trim();
-    if part || bare.starts_with('"') && bare.len() > 1 || !cell.contains(',') {
+    if as_it_is || bare.starts_with('"') && bare.len() > 1 || !cell.contains(',') {
         table.push_str(cell);
     } else if is_number(bare) {
         table.push_str(&bare.replace(',', "."));
@@ -176,6 +182,11 @@ mod tests {
                 "\"Monza, wet\"\n# 13\" rims, dry\nt,x\n1.5,\"one, two\"\n2.0,\"a;\nb\"\n3,\"1,234,5\"\n",
             ),
             ("a; b\n1.5; 2\n", "a, b\n1.5, 2\n"),
+            // More comments than rows, one of them the header.
+            (
+                "# by x; of y, z\n# wet, cold\n# a; b\n0,5; 1,5\n",
+                "# by x, of y, z\n# wet, cold\n# a, b\n0.5,1.5\n",
+            ),
         ] {
             assert_eq!(with_commas(text), expected);
         }

@@ -264,12 +264,16 @@ mod tests {
     }
 
     fn descended(most: f64) -> ([f64; 2], f64, usize) {
+        descended_until(most, |_| 1e-8)
+    }
+
+    fn descended_until(most: f64, least_gain: impl Fn(f64) -> f64) -> ([f64; 2], f64, usize) {
         let mut valley = Valley { most, asked: 0 };
         let start = DVector::from_vec(vec![0.2, 0.75]);
         let ControlFlow::Continue(Some(mut place)) = valley.place(start) else {
             panic!("nothing there");
         };
-        assert!(descend(&mut valley, &mut place, 100, |_| 1e-8).is_continue());
+        assert!(descend(&mut valley, &mut place, 100, least_gain).is_continue());
         (valley.of(&place.x), place.cost(), valley.asked)
     }
 
@@ -281,6 +285,14 @@ mod tests {
             "{a} {b} {cost}"
         );
         assert!(asked < 100, "{asked}");
+    }
+
+    #[test]
+    fn a_descent_ends_early_where_its_cost_asks_for_more_gain() {
+        let (_, _, to_the_end) = descended(2.0);
+        // No step promises more than the whole cost.
+        let (_, cost, asked) = descended_until(2.0, |cost| if cost < 0.1 { 1.0 } else { 1e-8 });
+        assert!(cost < 0.1 && asked < to_the_end, "{cost} {asked} {to_the_end}");
     }
 
     /// With `b` at most one half, the least of `100 (0.5 - a^2)^2 + (1 - a)^2` is where `200 a^3 - 99 a - 1 = 0`.

@@ -186,7 +186,7 @@ settings! {
         objectives: Vec<ObjectiveChoice> ["-"] = vec![ObjectiveChoice::All], choices(),
             "What is fitted: all channels together, or channels at once; more than one searches a Pareto front";
         norm: Norm ["-"] = Norm::Two, choice(),
-            "Norm of the costs that the swarm minimises; the polish is least squares whatever the norm";
+            "Norm of the costs; the polish of identify is least squares whatever the norm";
         window_s: Option<f64> ["s"] = None, optional(number(0.2, 1e5)).example("3.0"),
             "Length of the windows that restart from the log; without it whole laps are driven, or 5 s where the starting car does not drive them";
         settle_s: Option<f64> ["s"] = None, optional(number(0.0, 60.0)).example("2.0"),

@@ -478,11 +478,10 @@ impl AtMost<'_> {
             *end = self.reference.get(k).copied().unwrap_or(1.0);
         }
         let end = self.columns.closed::<WIDTH>(&own, self.i, &end);
-        let mut room = 1.0;
-        for k in 0..WIDTH {
-            room *= if own[k] < end[k] { end[k] - own[k] } else { 0.0 };
+        if (0..WIDTH).any(|k| own[k] >= end[k]) {
+            return 0.0;
         }
-        room
+        room::<WIDTH>(&own, &end)
     }
 }
 
