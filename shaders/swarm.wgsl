@@ -35,6 +35,7 @@ const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 const CROSSING_POWER: f32 = 21.0;
 const MUTATION_POWER: f32 = 9.0;
+const ANYWHERE: f32 = 0.2;
 
 // What random draws are for, the counter's last word.
 const START: u32 = 1u;
@@ -327,14 +328,17 @@ fn disturb_one(who: u32, slice: vec2<u32>) {
     }
 }
 
-// To a place between or about two archive members, each coordinate by itself, disturbed by polynomial mutation.
+// To a place between or about two archive members, each coordinate by itself, disturbed by mutation.
 fn cross_one(who: u32, leader: u32, slice: vec2<u32>) {
     let d = generation.dimensions;
     let other = below(words(RECOMBINE, who, 1u).x, generation.members);
     for (var k = slice.x; k < slice.y; k++) {
         let draws = words(RECOMBINE, who, 2u + k);
         var x = cross_coordinates(archive[leader * d + k], archive[other * d + k], draws.x, unit(draws.y));
-        if unit(draws.z) * f32(d) < 1.0 {
+        let mutates = unit(draws.z) * f32(d);
+        if mutates < ANYWHERE {
+            x = unit(draws.w);
+        } else if mutates < 1.0 {
             x = polynomial(x, unit(draws.w), MUTATION_POWER, 1.0 / MUTATION_POWER);
         }
         let i = place(who, d, k);

@@ -226,6 +226,42 @@ fn narrow_feasible_regions_are_found_and_filled() {
     }
 }
 
+/// MW6 of the same suite: each of fourteen coordinates has several hollows, and few of the ways between them are feasible. A swarm whose
+/// mutations are all near reaches 0.16 to 0.36, and with 4,096 particles the whole of 0.399 with two seeds of five.
+#[test]
+fn hollows_of_coordinates_are_left() {
+    let function = |x: &[f64], f: &mut [f64]| {
+        let n = x.len() as f64;
+        let apart = |(i, x): (usize, &f64)| {
+            let off = 1.0 - (-10.0 * (x - i as f64 / n).powi(2)).exp();
+            0.1 / n * off * off + 1.5 - 1.5 * (2.0 * std::f64::consts::PI * off).cos()
+        };
+        let distance = 1.0 + x.iter().enumerate().skip(1).map(apart).sum::<f64>();
+        f[0] = distance * x[0];
+        f[1] = distance * (1.21 - x[0] * x[0]).max(0.0).sqrt();
+        let wave = (6.0 * f[1].atan2(f[0]).powi(4)).cos().powi(10);
+        let shares = [f[0] / (1.0 + 0.15 * wave), f[1] / (1.0 + 0.75 * wave)];
+        f[2] = shares.iter().map(|share| share * share).sum::<f64>() - 1.0;
+    };
+    for (seed, large) in (1..6).flat_map(|seed| [(seed, false), (seed, true)]) {
+        let mut swarm = minimise_several(&[(0.0, 1.1); 15], 2, function)
+            .constraints(vec![Constraint::at_most_zero()])
+            .seed(seed);
+        if large {
+            swarm = swarm.population(4096).evaluations(200_000);
+        }
+        let found = swarm.run().unwrap();
+        let scaled: Vec<Vec<f64>> = found
+            .front
+            .objectives
+            .iter()
+            .map(|row| row.iter().map(|f| f / 1.1).collect())
+            .collect();
+        let volume = hypervolume(&scaled, &[1.1, 1.1]).unwrap();
+        assert!(found.is_feasible() && volume > 0.398, "{volume}, seed {seed}");
+    }
+}
+
 #[test]
 fn nothing_found_is_told() {
     let found = minimise(&BOUNDS, |_| f64::NAN).evaluations(400).run().unwrap();

@@ -24,6 +24,8 @@ const CROSSOVER: f32 = 0.3;
 /// One more than the distribution indices of the crossover and the mutation of a crossing.
 const CROSSING_POWER: f32 = 21.0;
 const MUTATION_POWER: f32 = 9.0;
+/// Share of the mutations of a crossing that put a coordinate anywhere, as for small swarms.
+const ANYWHERE: f32 = 0.2;
 /// Particles whose crossings are reckoned together.
 const SIDE_BY_SIDE: usize = 16;
 
@@ -341,8 +343,8 @@ fn difference(
     }
 }
 
-/// To places between or about two archive members, each coordinate by itself, disturbed by polynomial mutation; the particles
-/// of a few lanes side by side.
+/// To places between or about two archive members, each coordinate by itself, disturbed by mutation; the particles of a few lanes
+/// side by side.
 #[inline(always)]
 fn cross_few(
     g: &Generation,
@@ -376,7 +378,10 @@ fn cross_few(
         }
         for (i, lane) in lanes.iter().enumerate() {
             let mut x = child[i];
-            if unit_f32(words[2][i]) * (d as f32) < 1.0 {
+            let mutates = unit_f32(words[2][i]) * (d as f32);
+            if mutates < ANYWHERE {
+                x = unit_f32(words[3][i]);
+            } else if mutates < 1.0 {
                 x = polynomial(x, unit_f32(words[3][i]), (MUTATION_POWER, 1.0 / MUTATION_POWER));
             }
             position[k * BLOCK + lane] = x;

@@ -147,7 +147,7 @@ impl SmallSwarm {
     }
 
     /// To a place between or about the leader and a mate, each coordinate by itself, disturbed by polynomial mutation, as the
-    /// children of genetic algorithms \[5\].
+    /// children of genetic algorithms \[5\]. A few of the mutations go anywhere.
     fn crossing(&mut self, particle: usize, leader: usize) {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
         let uniform = |purpose: Purpose, index: u32| self.random.uniform(purpose as u32, when, who, index);
@@ -165,8 +165,11 @@ impl SmallSwarm {
                 let (low, high) = cross(one[k], other[k], drawn(1), CROSSING_INDEX);
                 x = if drawn(2) < 0.5 { low } else { high };
             }
-            if uniform(Purpose::Mutation, 2 * k as u32) < share {
-                x = polynomial(x, uniform(Purpose::Mutation, 2 * k as u32 + 1), MUTATION_INDEX);
+            let [mutates, where_to] = [0, 1].map(|index| uniform(Purpose::Mutation, 2 * k as u32 + index));
+            if mutates < ANYWHERE * share {
+                x = where_to;
+            } else if mutates < share {
+                x = polynomial(x, where_to, MUTATION_INDEX);
             }
             self.particles.position[i] = x;
             self.particles.velocity[i] = 0.0;
@@ -237,6 +240,9 @@ const CROSSOVER: f64 = 0.3;
 const CROSSING_INDEX: f64 = 20.0;
 /// Distribution index of its mutation. With the usual 20, UF5 ends at a hypervolume of 0.09 instead of 0.31.
 const MUTATION_INDEX: f64 = 8.0;
+/// Share of its mutations that put a coordinate anywhere within its bounds. Polynomial mutation hardly ever leaves a hollow for the
+/// next: without them, the median hypervolume of MW10 is 0.38 instead of 0.50.
+const ANYWHERE: f64 = 0.2;
 
 impl Optimiser for SmallSwarm {
     fn ask(&mut self) -> Vec<f64> {
