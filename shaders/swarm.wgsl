@@ -35,7 +35,7 @@ const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 const CROSSING_POWER: f32 = 21.0;
 const MUTATION_POWER: f32 = 9.0;
-const ANYWHERE: f32 = 0.2;
+const ANYWHERE: f32 = 0.15;
 
 // What random draws are for, the counter's last word.
 const START: u32 = 1u;

@@ -258,7 +258,7 @@ fn hollows_of_coordinates_are_left() {
             .map(|row| row.iter().map(|f| f / 1.1).collect())
             .collect();
         let volume = hypervolume(&scaled, &[1.1, 1.1]).unwrap();
-        assert!(found.is_feasible() && volume > 0.398, "{volume}, seed {seed}");
+        assert!(found.is_feasible() && volume > 0.39, "{volume}, seed {seed}");
     }
 }
 

@@ -25,7 +25,7 @@ const CROSSOVER: f32 = 0.3;
 const CROSSING_POWER: f32 = 21.0;
 const MUTATION_POWER: f32 = 9.0;
 /// Share of the mutations of a crossing that put a coordinate anywhere, as for small swarms.
-const ANYWHERE: f32 = 0.2;
+const ANYWHERE: f32 = 0.15;
 /// Particles whose crossings are reckoned together.
 const SIDE_BY_SIDE: usize = 16;
 
