@@ -33,6 +33,7 @@ const FAILED: u32 = 0x7f7fff00u;
 const REASONS: u32 = 15u;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
+const ALL_COORDINATES: f32 = 0.3;
 const CROSSING_POWER: f32 = 21.0;
 const MUTATION_POWER: f32 = 9.0;
 const ANYWHERE: f32 = 0.15;
@@ -293,17 +294,18 @@ fn pull_coordinate(i: u32, towards: f32, shares: Pulls) {
     position[i] = inside;
 }
 
-// From an archive member along the difference of two others, in some of the coordinates.
+// From an archive member along the difference of two others, in some of the coordinates or in all.
 fn differ_one(who: u32, leader: u32, slice: vec2<u32>) {
     let d = generation.dimensions;
     let picks = words(DIFFERENCE, who, 0u);
     let one = below(picks.x, generation.members);
     let two = below(picks.y, generation.members);
     let always = below(picks.z, d);
+    let whole = unit(picks.w) < ALL_COORDINATES;
     for (var four = slice.x / 4u; 4u * four < slice.y; four++) {
         let draws = words(DIFFERENCE, who, 1u + four);
         for (var k = 4u * four; k < min(4u * four + 4u, slice.y); k++) {
-            let chosen = k == always || unit(draws[k % 4u]) < CROSSOVER;
+            let chosen = whole || k == always || unit(draws[k % 4u]) < CROSSOVER;
             let step = SCALE * (archive[one * d + k] - archive[two * d + k]);
             let i = place(who, d, k);
             position[i] = held(archive[leader * d + k] + select(0.0, step, chosen));

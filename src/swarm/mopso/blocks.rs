@@ -21,6 +21,8 @@ pub const UNKNOWN: f32 = f32::MAX;
 /// Share of the difference that a difference move takes, and of the coordinates that it changes, as for small swarms.
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
+/// Share of the difference moves that change all coordinates.
+const ALL_COORDINATES: f32 = 0.3;
 /// One more than the distribution indices of the crossover and the mutation of a crossing.
 const CROSSING_POWER: f32 = 21.0;
 const MUTATION_POWER: f32 = 9.0;
@@ -317,7 +319,7 @@ pub fn advance(
     }
 }
 
-/// From an archive member along the difference of two others, in some of the coordinates.
+/// From an archive member along the difference of two others, in some of the coordinates or in all.
 #[inline(always)]
 fn difference(
     g: &Generation,
@@ -330,12 +332,13 @@ fn difference(
     let picks = g.words(Purpose::Difference, who, 0);
     let [one, two] = [0, 1].map(|i| below_u32(picks[i], g.members) as usize);
     let always = below_u32(picks[2], g.dimensions) as usize;
+    let whole = unit_f32(picks[3]) < ALL_COORDINATES;
     let mut words = [0; 4];
     for k in 0..d {
         if k % 4 == 0 {
             words = g.words(Purpose::Difference, who, 1 + k as u32 / 4);
         }
-        let chosen = k == always || unit_f32(words[k % 4]) < CROSSOVER;
+        let chosen = whole || k == always || unit_f32(words[k % 4]) < CROSSOVER;
         let step = SCALE * (leaders[one * d + k] - leaders[two * d + k]);
         let moved = leaders[from * d + k] + if chosen { step } else { 0.0 };
         position[k * BLOCK + lane] = moved.clamp(0.0, 1.0);

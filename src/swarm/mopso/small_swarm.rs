@@ -123,7 +123,7 @@ impl SmallSwarm {
         }
     }
 
-    /// From the leader along the difference of two mates, in some of the coordinates \[7\].
+    /// From the leader along the difference of two mates, in some of the coordinates or in all \[7\].
     fn difference_move(&mut self, particle: usize, leader: usize) {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
         let purpose = Purpose::Difference as u32;
@@ -134,9 +134,10 @@ impl SmallSwarm {
             [leader, first, second].map(|m| parent(&self.archive, &self.best_position, m));
         let row = self.particles.row(particle);
         let always = pick(2, row.len().max(1));
+        let whole = self.random.uniform(purpose, when, who, 3) < ALL_COORDINATES;
         for (k, i) in row.enumerate() {
             let chosen = self.random.uniform(purpose, when, who, 4 + k as u32) < CROSSOVER;
-            let step = if chosen || k == always {
+            let step = if whole || chosen || k == always {
                 SCALE * (first[k] - second[k])
             } else {
                 0.0
@@ -236,6 +237,9 @@ const SCALE: f64 = 0.5;
 /// Share of the coordinates that a difference move changes. A third solves ZDT4 where all of them sometimes do
 /// not, and spreads DTLZ2's front better.
 const CROSSOVER: f64 = 0.3;
+/// Share of the difference moves that change all coordinates. Where variables are linked, the difference of two members tells how they
+/// change together; without these moves, UF3 ends at 0.56 instead of 0.59.
+const ALL_COORDINATES: f64 = 0.3;
 /// Distribution index of the crossover of a crossing.
 const CROSSING_INDEX: f64 = 20.0;
 /// Distribution index of its mutation. With the usual 20, UF5 ends at a hypervolume of 0.09 instead of 0.31.
