@@ -14,9 +14,8 @@ const TUTORIALS: [&[&str]; 5] = [
     &["surface"],
 ];
 
-/// What lines say that tell of the machine: its instruction set, how fast it is, and which member of a front is the compromise, for which
-/// a figure in the last place will do.
-const OF_THE_MACHINE: [&str; 4] = ["simd", "a second", "states in", "compromise"];
+/// What lines say that tell of the machine: its instruction set, and how fast it is.
+const OF_THE_MACHINE: [&str; 3] = ["simd", "a second", "states in"];
 
 /// The commands of a page, each with what it is said to print.
 fn recipes(page: &str) -> Vec<(Vec<String>, Vec<String>)> {

@@ -5,8 +5,8 @@ use lapswarm::evaluate::{Objective, Problem, Variable};
 use lapswarm::swarm::checkpoint::{load_optimiser, save_optimiser};
 use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::swarm::{
-    Front, Islands, MULTI_OBJECTIVE, Mopso, MopsoSettings, Optimiser, SINGLE_OBJECTIVE, Sizes, Stopped,
-    by_name, run, step,
+    Front, Islands, MULTI_OBJECTIVE, Minimum, Mopso, MopsoSettings, Optimiser, SINGLE_OBJECTIVE, Sizes,
+    Stopped, by_name, run, step,
 };
 use lapswarm::{minimise, minimise_batch, minimise_several};
 use std::ops::ControlFlow;
@@ -189,6 +189,22 @@ fn a_swarm_moves_along_the_surface_of_an_equality() {
     }
 }
 
+/// What swarms of 100 and of 4,096 particles find for two objectives under one constraint, of fifteen variables from zero to `upper`,
+/// with five seeds.
+fn small_and_large(upper: f64, function: fn(&[f64], &mut [f64])) -> Vec<(u64, Minimum)> {
+    let runs = (1..6).flat_map(|seed| [(seed, false), (seed, true)]);
+    let found = runs.map(|(seed, large)| {
+        let mut swarm = minimise_several(&[(0.0, upper); 15], 2, function)
+            .constraints(vec![Constraint::at_most_zero()])
+            .seed(seed);
+        if large {
+            swarm = swarm.population(4096).evaluations(200_000);
+        }
+        (seed, swarm.run().unwrap())
+    });
+    found.collect()
+}
+
 /// MW1 of Ma and Wang (*Evolutionary constrained multiobjective optimization: test suite construction and performance comparisons*,
 /// 2019): its feasible region is a few narrow patches about the front, and every way there leads over hollows of the violation. A swarm
 /// that follows its one least violating candidate finds none of them with four seeds of nine, and a part of the front with four more; one
@@ -207,14 +223,7 @@ fn narrow_feasible_regions_are_found_and_filled() {
         let along = std::f64::consts::SQRT_2 * (f[1] - f[0]);
         f[2] = f[0] + f[1] - 1.0 - 0.5 * (2.0 * std::f64::consts::PI * along).sin().powi(8);
     };
-    for (seed, large) in (1..6).flat_map(|seed| [(seed, false), (seed, true)]) {
-        let mut swarm = minimise_several(&[(0.0, 1.0); 15], 2, function)
-            .constraints(vec![Constraint::at_most_zero()])
-            .seed(seed);
-        if large {
-            swarm = swarm.population(4096).evaluations(200_000);
-        }
-        let found = swarm.run().unwrap();
+    for (seed, found) in small_and_large(1.0, function) {
         let front = &found.front;
         assert!(found.is_feasible(), "{} with seed {seed}", front.violation);
         let volume = hypervolume(&front.objectives, &[1.1, 1.1]).unwrap();
@@ -243,14 +252,7 @@ fn hollows_of_coordinates_are_left() {
         let shares = [f[0] / (1.0 + 0.15 * wave), f[1] / (1.0 + 0.75 * wave)];
         f[2] = shares.iter().map(|share| share * share).sum::<f64>() - 1.0;
     };
-    for (seed, large) in (1..6).flat_map(|seed| [(seed, false), (seed, true)]) {
-        let mut swarm = minimise_several(&[(0.0, 1.1); 15], 2, function)
-            .constraints(vec![Constraint::at_most_zero()])
-            .seed(seed);
-        if large {
-            swarm = swarm.population(4096).evaluations(200_000);
-        }
-        let found = swarm.run().unwrap();
+    for (seed, found) in small_and_large(1.1, function) {
         let scaled: Vec<Vec<f64>> = found
             .front
             .objectives
