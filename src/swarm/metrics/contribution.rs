@@ -1,6 +1,7 @@
 //! What each point of a set alone dominates.
 
-use super::columns::{COLUMNS, Columns};
+use super::boxes::COLUMNS;
+use super::columns::Columns;
 use super::hypervolume::{Point, bites, hypervolume, point, volume};
 use crate::error::Result;
 

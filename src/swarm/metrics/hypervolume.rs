@@ -1,6 +1,7 @@
 //! Exact hypervolume.
 
-use super::columns::{COLUMNS, Columns};
+use super::boxes::COLUMNS;
+use super::columns::Columns;
 use super::staircase::Staircase;
 use crate::error::{Error, Result};
 

@@ -18,6 +18,7 @@
 //!    optimization*, IEEE TEC 19 (2015) (fronts by bisection).
 //! 7. While, Bradstreet, Barone, *A fast way of calculating exact hypervolumes*, IEEE TEC 16 (2012) (four objectives and more).
 
+mod boxes;
 mod columns;
 mod contribution;
 mod hypervolume;
@@ -26,6 +27,7 @@ mod non_dominated;
 mod ranks;
 mod significance;
 mod staircase;
+mod within;
 
 pub(super) use columns::Columns;
 pub use contribution::contributions;
@@ -36,3 +38,4 @@ pub use non_dominated::non_dominated;
 pub use ranks::ranks;
 pub use significance::signed_rank;
 pub(super) use staircase::Staircase;
+pub(super) use within::{Asked, Within};

@@ -83,11 +83,9 @@ impl SmallSwarm {
     /// The parent that a particle follows, as [`parent`] counts them. While nothing feasible is known, the archive has little more
     /// than the one candidate that violates least. A swarm that follows it ends in the hollow where that lies. So two particles are
     /// drawn, and the own best that violates less leads.
-    fn leader(&self, worth: &[f64], particle: usize) -> usize {
-        let draw = |count, index| {
-            let (when, who) = (self.counters.iteration as u32, particle as u32);
-            self.random.below(count, Purpose::Leader as u32, when, who, index)
-        };
+    fn leader(&mut self, worth: &[f64], particle: usize) -> usize {
+        let (random, when, who) = (self.random, self.counters.iteration as u32, particle as u32);
+        let draw = |count, index| random.below(count, Purpose::Leader as u32, when, who, index);
         let members = self.archive.len();
         if self.archive.violation() > 0.0 {
             let [first, second] = [0, 1].map(|index| draw(self.particles.count, index));
@@ -100,7 +98,7 @@ impl SmallSwarm {
             Leaders::Random => first,
             Leaders::Tournament => {
                 let second = draw(1);
-                if worth[second] > worth[first] {
+                if self.archive.contributes_more(worth, second, first) {
                     second
                 } else {
                     first
@@ -179,8 +177,7 @@ impl SmallSwarm {
 
     fn advance(&mut self) {
         let share = self.counters.iteration as f64 / (self.settings.motion.iterations.max(2) - 1) as f64;
-        self.archive.measure();
-        let worth = self.archive.worth();
+        let worth = self.archive.worth_at_once();
         for particle in 0..self.settings.motion.population {
             if self.archive.is_empty() {
                 // Nobody knows anything yet.
