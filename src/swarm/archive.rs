@@ -646,6 +646,29 @@ mod tests {
         }
     }
 
+    /// Volumes that are too large for a number end no insertion.
+    #[test]
+    fn holds_any_finite_objectives() {
+        for (truncation, width) in ALL.into_iter().flat_map(|t| [(t, 2), (t, 3), (t, 4), (t, 5)]) {
+            for scale in [1e60, 1e150, 1e300] {
+                let mut archive = Archive::new(12, truncation);
+                let mut fixed = Archive::new(12, truncation).measured_from(vec![65.0 * scale; width]);
+                for p in points(width as u32, 400) {
+                    let p: Vec<f64> = p.iter().map(|x| x * scale).collect();
+                    archive.insert(&p, &p);
+                    fixed.insert(&p, &p);
+                    let (one, other) = (archive.len() - 1, archive.len() / 2);
+                    let worth = archive.worth_at_once();
+                    archive.contributes_more(&worth, one, other);
+                }
+                for archive in [archive, fixed] {
+                    assert!((1..=12).contains(&archive.len()));
+                    assert_eq!(non_dominated(&archive.objectives).len(), archive.len());
+                }
+            }
+        }
+    }
+
     /// Which of two contributes more is found without knowing either exactly.
     #[test]
     fn contributes_more_by_bounds() {

@@ -18,7 +18,7 @@ pub(super) fn point(row: &[f64]) -> Point {
 
 /// The volume of what the points dominate up to `reference`, for one to eight objectives. Points that are not better than the
 /// reference in every objective add nothing. Up to three objectives it takes `O(n log n)` \[1\]. For each objective more, every point
-/// takes a hypervolume of one objective less \[7\]: a hundred points of five objectives take a millisecond, spread over a sphere.
+/// takes a hypervolume of one objective less \[7\]: a hundred points of five objectives take less than a millisecond, spread over a sphere.
 ///
 /// # Errors
 /// [`Error::Input`] if the number of objectives is not one to eight or rows differ from the reference in width.

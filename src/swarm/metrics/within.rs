@@ -35,7 +35,9 @@ impl Within {
         most: f64::INFINITY,
     };
 
+    /// What is not a number, as the difference of two volumes that are too large for one, is nothing.
     pub fn exactly(volume: f64) -> Self {
+        let volume = volume.max(0.0);
         Self {
             least: volume,
             most: volume,
