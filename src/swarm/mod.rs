@@ -55,6 +55,7 @@ mod minimise;
 mod moead;
 mod mopso;
 mod motion;
+mod nearness;
 mod nsga2;
 mod nsga3;
 #[cfg(feature = "studies")]

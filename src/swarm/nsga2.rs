@@ -4,8 +4,8 @@
 //! (2002).
 
 use super::Optimiser;
-use super::archive::crowding;
 use super::genetic::{self, Breeding, Generation, Member, fronts};
+use super::nearness::crowding;
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use serde::{Deserialize, Serialize};

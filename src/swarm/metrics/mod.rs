@@ -27,6 +27,7 @@ mod non_dominated;
 mod ranks;
 mod significance;
 mod staircase;
+mod three;
 mod within;
 
 pub(super) use columns::Columns;
