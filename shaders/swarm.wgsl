@@ -13,6 +13,10 @@ struct Generation {
     signed: u32,
     per_dimension: u32,
     tournament: u32,
+    // One where a row more than those of the objectives says by how much particles violate constraints.
+    constrained: u32,
+    // By how much the members of the archive do.
+    violation: f32,
     inertia: f32,
     cognitive: f32,
     social: f32,
@@ -30,7 +34,7 @@ const BLOCK: u32 = 64u;
 const UNKNOWN: f32 = 3.4028234e38;
 // Objectives of this size and more say in their last eight bits why a particle failed; this many reasons are told apart.
 const FAILED: u32 = 0x7f7fff00u;
-const REASONS: u32 = 15u;
+const REASONS: u32 = 14u;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 const ALL_COORDINATES: f32 = 0.3;
@@ -57,10 +61,11 @@ const RECOMBINE: u32 = 9u;
 @group(0) @binding(4) var<storage, read_write> best_position: array<f32>;
 @group(0) @binding(5) var<storage, read_write> best_objectives: array<f32>;
 @group(0) @binding(6) var<storage, read_write> objectives: array<f32>;
-// How many points may enter the archive, and how many particles failed for each reason; then those points: the particle and its
-// objectives, three to each.
+// How many points may enter the archive, the bits of the least violation of a particle, and how many failed for each reason; then those
+// points: the particle and its objectives, three to each.
 struct Found {
     count: atomic<u32>,
+    least: atomic<u32>,
     failed: array<atomic<u32>, REASONS>,
     points: array<vec4<u32>>,
 }
@@ -73,6 +78,11 @@ fn words(purpose: u32, who: u32, index: u32) -> vec4<u32> {
 // Where coordinate `k` of `width` of a particle stands.
 fn place(who: u32, width: u32, k: u32) -> u32 {
     return (who / BLOCK * width + k) * BLOCK + who % BLOCK;
+}
+
+// Rows of objectives.
+fn rows() -> u32 {
+    return generation.objectives + generation.constrained;
 }
 
 fn held(x: f32) -> f32 {
@@ -88,8 +98,8 @@ fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
         let i = place(who, generation.dimensions, k);
         best_position[i] = position[i];
     }
-    for (var k = 0u; k < generation.objectives; k++) {
-        best_objectives[place(who, generation.objectives, k)] = UNKNOWN;
+    for (var k = 0u; k < rows(); k++) {
+        best_objectives[place(who, rows(), k)] = UNKNOWN;
     }
 }
 
@@ -103,22 +113,33 @@ fn scatter_one(who: u32, slice: vec2<u32>) {
     }
 }
 
-// Takes positions for personal bests where their objectives are better; where neither is better, at random. Counts failures.
+// Takes positions for personal bests where they violate less, or as much and their objectives are better; where neither is better, at
+// random. Counts failures.
 @compute @workgroup_size(BLOCK)
 fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let who = id.y * groups.x * BLOCK + id.x;
     if who >= generation.particles { return; }
-    let width = generation.objectives;
+    let width = rows();
     var no_worse = true;
     var no_better = true;
+    // Of violations, which count first.
+    var less = false;
+    var more = false;
+    var violation = 0.0;
     var sound = true;
     var reason = 0u;
     for (var k = 0u; k < width; k++) {
         let i = place(who, width, k);
         let value = objectives[i];
         let best = best_objectives[i];
-        no_worse = no_worse && value <= best;
-        no_better = no_better && best <= value;
+        if k < generation.objectives {
+            no_worse = no_worse && value <= best;
+            no_better = no_better && best <= value;
+        } else {
+            violation = max(value, 0.0);
+            less = violation < max(best, 0.0);
+            more = violation > max(best, 0.0);
+        }
         let size = size_of(value);
         if size >= FAILED {
             sound = false;
@@ -130,10 +151,11 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
         atomicAdd(&found.failed[reason], 1u);
         return;
     }
+    if generation.constrained == 1u { atomicMin(&found.least, size_of(violation)); }
     let heads = words(COIN, who, 0u).x < 0x80000000u;
     let better = no_worse && !no_better;
     let open = no_worse == no_better;
-    if better || (open && heads) {
+    if less || (!more && (better || (open && heads))) {
         for (var k = 0u; k < generation.dimensions; k++) {
             let i = place(who, generation.dimensions, k);
             best_position[i] = position[i];
@@ -175,12 +197,21 @@ fn note(
     found.points[slot] = vec4<u32>(who, bitcast<vec3<u32>>(at));
 }
 
-// The objectives of a particle; unknown ones if it has failed or a member of the archive dominates or equals it.
+// The objectives of a particle; unknown ones if it has failed, violates more than the least that is known, or a member of the archive
+// dominates or equals it.
 fn may_enter(who: u32) -> vec3<f32> {
     var at = vec3<f32>(0.0);
     for (var k = 0u; k < generation.objectives; k++) {
-        at[k] = objectives[place(who, generation.objectives, k)];
+        at[k] = objectives[place(who, rows(), k)];
         if size_of(at[k]) >= FAILED { return vec3<f32>(UNKNOWN); }
+    }
+    if generation.constrained == 1u {
+        let value = objectives[place(who, rows(), generation.objectives)];
+        let least = atomicLoad(&found.least);
+        let known = size_of(generation.violation);
+        if size_of(value) >= FAILED || size_of(max(value, 0.0)) > min(least, known) { return vec3<f32>(UNKNOWN); }
+        // The members leave.
+        if least < known { return at; }
     }
     for (var i = 0u; i < 3u * generation.members; i += 3u) {
         if archive[i] <= at.x && archive[i + 1u] <= at.y && archive[i + 2u] <= at.z { return vec3<f32>(UNKNOWN); }

@@ -8,7 +8,8 @@ struct Gathering {
 // As in `swarm.wgsl`.
 struct Found {
     count: u32,
-    failed: array<u32, 15>,
+    least: u32,
+    failed: array<u32, 14>,
     points: array<vec4<u32>>,
 }
 

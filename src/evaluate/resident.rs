@@ -23,10 +23,17 @@ pub trait DeviceObjectives {
     /// The problem that they are of.
     fn problem(&self) -> &super::Problem;
 
+    /// Whether there are constraints, and a row that says by how much they are violated. Swarms go by Deb's rules then: what violates
+    /// less is better, whatever its objectives.
+    fn is_constrained(&self) -> bool {
+        false
+    }
+
     /// Writes the objectives of `particles` particles. Both buffers are in blocks of [`BLOCK`] particles: a coordinate of
     /// all particles of a block in a row of `f32`, the coordinates of a block one after the other. Positions are
     /// in the unit cube of those variables whose bounds differ; [`super::Variable::at`] says what they stand for. A particle that
-    /// failed has [`failed_objective`] for every objective.
+    /// failed has [`failed_objective`] for every objective. Where the problem is constrained, a row more follows: by how much each
+    /// particle violates its constraints in all, zero for one that keeps them.
     ///
     /// # Errors
     /// [`crate::Error::Device`] if the device fails.

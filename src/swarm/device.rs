@@ -6,10 +6,11 @@
 
 use super::archive::Archive;
 use super::checkpoint::Checkpoint;
-use super::mopso::blocks::Generation;
+use super::mopso::blocks::{Generation, UNKNOWN};
 use super::mopso::earnings::Earnings;
 use super::mopso::filter::{Point, front};
 use super::mopso::large_swarm::{empty_archive, leaders, take_in};
+use super::mopso::stand_ins::StandIns;
 use super::mopso::thinning::{PER_PLACE, thinned};
 use super::settings::MopsoSettings;
 use super::space::Space;
@@ -28,13 +29,13 @@ use wgpu::BufferUsages as Usage;
 pub use crate::evaluate::resident::{BLOCK, DeviceObjectives};
 
 /// Failures that are told apart.
-const REASONS: usize = 15;
+const REASONS: usize = 14;
 /// Particles that may enter an archive which are read back unasked, with their positions.
 const AT_ONCE: usize = 512;
 /// Of more particles that may enter an archive than this, a card leaves out those that the first of them dominate before they are read.
 const TOO_MANY: usize = 8192;
-/// Bytes before the points of the list of those found: their number, and the failures by reason.
-const HEADER: u64 = 4 * (1 + REASONS as u64);
+/// Bytes before the points of the list of those found: their number, the least violation, and the failures by reason.
+const HEADER: u64 = 4 * (2 + REASONS as u64);
 const _: () = assert!(Failure::WORDS.len() <= REASONS && HEADER.is_multiple_of(16));
 
 /// The points of a list of those found, as far as it goes.
@@ -55,19 +56,60 @@ fn row_major(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
     (0..n * width).map(|j| at(j / width, j % width)).collect()
 }
 
+/// The last row of blocks of `width` rows for `n` particles; infinite where nothing is known.
+fn last_row(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
+    let rows = blocks.chunks_exact(BLOCK * width);
+    let last = rows.flat_map(|block| &block[BLOCK * (width - 1)..]);
+    let known = last.take(n).map(|x| match *x < UNKNOWN {
+        true => f64::from(x.max(0.0)),
+        false => f64::INFINITY,
+    });
+    known.collect()
+}
+
 /// A swarm off its device, for [`super::checkpoint`].
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DeviceState {
     pub(super) settings: MopsoSettings,
     pub(super) space: Space,
     pub(super) objectives: usize,
+    pub(super) constrained: bool,
     pub(super) position: Vec<f32>,
     pub(super) velocity: Vec<f32>,
     pub(super) best_position: Vec<f32>,
+    /// With a row for violations behind those of the objectives, if there are constraints.
     pub(super) best_objectives: Vec<f32>,
     pub(super) archive: Archive,
     pub(super) earnings: Earnings,
     pub(super) counters: Counters,
+}
+
+impl DeviceState {
+    /// Rows of objectives of a particle.
+    fn rows(&self) -> usize {
+        self.objectives + usize::from(self.constrained)
+    }
+
+    /// The objectives of own bests, in blocks.
+    pub(super) fn best_costs(&self) -> Vec<f32> {
+        let blocks = self.best_objectives.chunks_exact(BLOCK * self.rows());
+        blocks
+            .flat_map(|block| &block[..BLOCK * self.objectives])
+            .copied()
+            .collect()
+    }
+
+    /// By how much own bests violate the constraints, if there are any.
+    pub(super) fn best_violation(&self) -> Vec<f64> {
+        if !self.constrained {
+            return Vec::new();
+        }
+        last_row(
+            &self.best_objectives,
+            self.settings.motion.population,
+            self.rows(),
+        )
+    }
 }
 
 impl Checkpoint for DeviceState {
@@ -81,6 +123,8 @@ struct Noted {
     points: Vec<Point>,
     /// Their positions.
     rows: Vec<f32>,
+    /// The least violation of a particle, or of the archive if that is less.
+    violation: f64,
     /// Particles that have failed, by reason, if bests have learnt along with it.
     failures: FailureCounts,
 }
@@ -90,6 +134,8 @@ struct Newcomers {
     points: Vec<Point>,
     /// Their positions.
     rows: Vec<f32>,
+    /// By how much all of them violate the constraints.
+    violation: f64,
     failures: FailureCounts,
 }
 
@@ -114,15 +160,19 @@ struct Buffers {
     gathering: wgpu::Buffer,
     rows: wgpu::Buffer,
     swarm: wgpu::BindGroup,
+    /// Gathers positions, and own bests.
     gather: wgpu::BindGroup,
+    gather_bests: wgpu::BindGroup,
 }
 
-/// A swarm of one to three objectives without constraints on a device, with the settings of [`super::Mopso`]. With one objective it
-/// is the plain particle swarm: the archive is the best that was found, and every move is a pull towards it and the own best.
+/// A swarm of one to three objectives on a device, with the settings of [`super::Mopso`]. With one objective it is the plain particle
+/// swarm: the archive is the best that was found, and every move is a pull towards it and the own best.
 pub struct DeviceMopso {
     settings: MopsoSettings,
     space: Space,
     objectives: usize,
+    /// Whether particles have a row for what they violate.
+    constrained: bool,
     context: Arc<GpuContext>,
     kernels: Kernels,
     buffers: Buffers,
@@ -146,6 +196,28 @@ impl DeviceMopso {
     /// [`Error::Input`] naming the setting that is out of its range, also where the device has no room for so many particles;
     /// [`Error::Device`] if the device fails.
     pub fn new(problem: &Problem, settings: MopsoSettings, context: Arc<GpuContext>) -> Result<Self> {
+        Self::scattered(problem, false, settings, context)
+    }
+
+    /// The same for objectives with constraints ([`DeviceObjectives::is_constrained`]). It goes by Deb's rules, as [`super::Mopso`]
+    /// does, with violations in single precision.
+    ///
+    /// # Errors
+    /// Those of [`DeviceMopso::new`].
+    pub fn with_constraints(
+        problem: &Problem,
+        settings: MopsoSettings,
+        context: Arc<GpuContext>,
+    ) -> Result<Self> {
+        Self::scattered(problem, true, settings, context)
+    }
+
+    fn scattered(
+        problem: &Problem,
+        constrained: bool,
+        settings: MopsoSettings,
+        context: Arc<GpuContext>,
+    ) -> Result<Self> {
         let space = Space::new(problem)?;
         let (d, width) = (space.dimensions(), problem.objectives.len());
         if d == 0 || !(1..=3).contains(&width) {
@@ -159,7 +231,7 @@ impl DeviceMopso {
             ));
         }
         let archive = empty_archive(problem, &settings)?;
-        let (swarm, scatter) = Self::unborn(settings, space, archive, width, context)?;
+        let (swarm, scatter) = Self::unborn(settings, space, archive, (width, constrained), context)?;
         swarm.dispatch(&scatter, 0)?;
         Ok(swarm)
     }
@@ -169,7 +241,7 @@ impl DeviceMopso {
         settings: MopsoSettings,
         space: Space,
         archive: Archive,
-        width: usize,
+        (objectives, constrained): (usize, bool),
         context: Arc<GpuContext>,
     ) -> Result<(Self, Arc<Kernel>)> {
         use Binding::{Read, Uniform, Write};
@@ -186,11 +258,14 @@ impl DeviceMopso {
         };
         let n = settings.motion.population;
         let lanes = n.next_multiple_of(BLOCK) as u64;
+        let width = objectives + usize::from(constrained);
         let (state, worth) = (lanes * d as u64 * 4, lanes * width as u64 * 4);
         let members = (settings.archive + AT_ONCE) as u64;
         let most = PER_PLACE * settings.archive;
-        let listed = HEADER + lanes * 16;
-        let largest = state.max(listed + (AT_ONCE * d * 4) as u64);
+        // An own best may stand in for more than one member.
+        let listed = HEADER + lanes.max(settings.archive as u64) * 16;
+        let gathered = (most.max(AT_ONCE) * d) as u64 * 4;
+        let largest = state.max(worth).max(listed + gathered);
         let room = most_particles(&context, d);
         if n > room {
             let found = n.to_string();
@@ -213,11 +288,11 @@ impl DeviceMopso {
         let velocity = context.buffer("velocities", state, on)?;
         let best_position = context.buffer("best positions", state, on)?;
         let best_objectives = context.buffer("best objectives", worth, on)?;
-        let objectives = context.buffer("objectives", worth, on)?;
+        let worths = context.buffer("objectives", worth, on)?;
         let found = context.buffer("candidates", listed, on)?;
         let readback = context.buffer("readback", largest, Usage::MAP_READ | Usage::COPY_DST)?;
         let gathering = context.buffer("gathering", 16, Usage::UNIFORM | Usage::COPY_DST)?;
-        let rows = context.buffer("chosen positions", (most.max(AT_ONCE) * d) as u64 * 4, on)?;
+        let rows = context.buffer("chosen positions", gathered, on)?;
         let state = [
             &generation,
             &leaders,
@@ -225,11 +300,12 @@ impl DeviceMopso {
             &velocity,
             &best_position,
             &best_objectives,
-            &objectives,
+            &worths,
             &found,
         ];
         let swarm = context.bind(&scatter, &state)?;
         let gather = context.bind(&kernels.gather, &[&gathering, &found, &position, &rows])?;
+        let gather_bests = context.bind(&kernels.gather, &[&gathering, &found, &best_position, &rows])?;
         let buffers = Buffers {
             generation,
             archive: leaders,
@@ -237,18 +313,20 @@ impl DeviceMopso {
             velocity,
             best_position,
             best_objectives,
-            objectives,
+            objectives: worths,
             found,
             readback,
             gathering,
             rows,
             swarm,
             gather,
+            gather_bests,
         };
         let swarm = Self {
             archive,
             earnings: Earnings::default(),
-            objectives: width,
+            objectives,
+            constrained,
             settings,
             space,
             context,
@@ -295,10 +373,11 @@ impl DeviceMopso {
             position: rows(&self.buffers.position, d)?,
             velocity: rows(&self.buffers.velocity, d)?,
             best_position: rows(&self.buffers.best_position, d)?,
-            best_objectives: rows(&self.buffers.best_objectives, self.objectives)?,
+            best_objectives: rows(&self.buffers.best_objectives, self.rows())?,
             settings: self.settings.clone(),
             space: self.space.clone(),
             objectives: self.objectives,
+            constrained: self.constrained,
             archive: self.archive.clone(),
             earnings: self.earnings.clone(),
             counters: self.counters,
@@ -314,7 +393,7 @@ impl DeviceMopso {
             state.settings,
             state.space,
             state.archive,
-            state.objectives,
+            (state.objectives, state.constrained),
             context,
         )?;
         let buffers = &swarm.buffers;
@@ -341,7 +420,12 @@ impl DeviceMopso {
     /// Memory of the swarm on the device, bytes for each particle.
     pub fn bytes_per_particle(&self) -> usize {
         // Objectives stand there twice, and each particle has a place in the list of candidates and in its copy.
-        (3 * self.space.dimensions() + 2 * self.objectives) * size_of::<f32>() + 16
+        (3 * self.space.dimensions() + 2 * self.rows()) * size_of::<f32>() + 16
+    }
+
+    /// Rows of objectives of a particle.
+    fn rows(&self) -> usize {
+        self.objectives + usize::from(self.constrained)
     }
 
     /// What is the same for all particles in the present iteration, with so many members.
@@ -350,9 +434,13 @@ impl DeviceMopso {
         Generation::new(&self.settings, &self.earnings, sizes, self.counters.iteration)
     }
 
-    /// Tells the kernels of it.
-    fn announce(&self, members: usize) {
-        let generation = self.generation(members);
+    /// Tells the kernels of it. The members violate the constraints by so much.
+    fn announce(&self, members: usize, violation: f64) {
+        let generation = Generation {
+            constrained: u32::from(self.constrained),
+            violation: (violation as f32).min(UNKNOWN),
+            ..self.generation(members)
+        };
         self.context
             .write(&self.buffers.generation, bytemuck::bytes_of(&generation));
     }
@@ -373,7 +461,7 @@ impl DeviceMopso {
 
     /// Runs a kernel of the swarm for the present iteration against so many members.
     fn dispatch(&self, kernel: &Kernel, members: usize) -> Result<()> {
-        self.announce(members);
+        self.announce(members, self.archive.violation());
         self.context.run(|encoder| self.record(encoder, kernel))
     }
 
@@ -384,8 +472,9 @@ impl DeviceMopso {
             .read_back((from, 0), readback, bytes, bytemuck::pod_collect_to_vec)
     }
 
-    /// Notes the particles that may enter an archive of these members. If the swarm `learns`, its personal bests learn first.
-    fn note(&self, members: &[[f64; 3]], learns: bool) -> Result<Noted> {
+    /// Notes the particles that may enter an archive of these members, which violate the constraints by so much. If the swarm
+    /// `learns`, its personal bests learn first.
+    fn note(&self, members: &[[f64; 3]], violation: f64, learns: bool) -> Result<Noted> {
         let Buffers {
             archive,
             found,
@@ -395,8 +484,10 @@ impl DeviceMopso {
         } = &self.buffers;
         let table: Vec<f32> = members.iter().flatten().map(|x| *x as f32).collect();
         self.context.write(archive, bytemuck::cast_slice(&table));
-        self.context.write(found, &[0; HEADER as usize]);
-        self.announce(members.len());
+        let mut header = [0; HEADER as usize / 4];
+        header[1] = UNKNOWN.to_bits();
+        self.context.write(found, bytemuck::cast_slice(&header));
+        self.announce(members.len(), violation);
         let n = self.settings.motion.population;
         let most = n.min(AT_ONCE);
         self.announce_gathering(most);
@@ -408,7 +499,7 @@ impl DeviceMopso {
                     self.record(encoder, &self.kernels.learn);
                 }
                 self.record(encoder, &self.kernels.note);
-                self.record_gather(encoder, most);
+                self.record_gather(encoder, &self.buffers.gather, most);
             },
             &[(found, 0..head), (rows, 0..row_bytes)],
             readback,
@@ -418,13 +509,17 @@ impl DeviceMopso {
         let count = (list[0] as usize).min(n);
         let failures = Failure::WORDS
             .iter()
-            .zip(&list[1..])
+            .zip(&list[2..])
             .filter(|(_, count)| **count > 0)
             .map(|(word, count)| ((*word).to_owned(), u64::from(*count)));
         Ok(Noted {
             count,
             points: points_of(list, count),
             rows: rows.iter().map(|word| f32::from_bits(*word)).collect(),
+            violation: match self.constrained {
+                true => violation.min(f64::from(f32::from_bits(list[1]))),
+                false => 0.0,
+            },
             failures: failures.collect(),
         })
     }
@@ -434,13 +529,19 @@ impl DeviceMopso {
         let (d, width) = (self.space.dimensions(), self.objectives);
         let at = |row: &Vec<f64>| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0));
         let mut members: Vec<[f64; 3]> = self.archive.objectives.iter().map(at).collect();
-        let mut noted = self.note(&members, true)?;
+        let known = self.archive.violation();
+        let mut noted = self.note(&members, known, true)?;
+        let violation = noted.violation;
+        if violation < known {
+            // They leave the archive.
+            members.clear();
+        }
         let failures = std::mem::take(&mut noted.failures);
         let mut sample = Vec::new();
         if noted.count > TOO_MANY && self.context.is_shaped_for_a_card() {
             sample = front(noted.points, width);
             members.extend(sample.iter().map(|p| p.at));
-            noted = self.note(&members, false)?;
+            noted = self.note(&members, violation, false)?;
         }
         let mut place = None;
         if noted.count > noted.points.len() {
@@ -463,11 +564,12 @@ impl DeviceMopso {
                 let row = |p: &Point| &noted.rows[place[&p.who] * d..][..d];
                 points.iter().flat_map(row).copied().collect()
             }
-            None => self.gather(&points)?,
+            None => self.gather(&self.buffers.gather, points.iter().map(|p| p.who))?,
         };
         Ok(Newcomers {
             points,
             rows,
+            violation,
             failures,
         })
     }
@@ -480,28 +582,33 @@ impl DeviceMopso {
     }
 
     /// Records it.
-    fn record_gather(&self, encoder: &mut wgpu::CommandEncoder, most: usize) {
+    fn record_gather(&self, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, most: usize) {
         let (x, y) = groups(most * self.space.dimensions());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(&self.kernels.gather.pipeline);
-        pass.set_bind_group(0, &self.buffers.gather, &[]);
+        pass.set_bind_group(0, group, &[]);
         pass.dispatch_workgroups(x, y, 1);
     }
 
-    /// Positions of these particles.
-    fn gather(&self, points: &[Point]) -> Result<Vec<f32>> {
-        if points.is_empty() {
+    /// Positions or own bests of these particles.
+    fn gather(
+        &self,
+        group: &wgpu::BindGroup,
+        particles: impl ExactSizeIterator<Item = u32>,
+    ) -> Result<Vec<f32>> {
+        let count = particles.len();
+        if count == 0 {
             return Ok(Vec::new());
         }
         let mut list = vec![0u32; HEADER as usize / 4];
-        list[0] = points.len() as u32;
-        list.extend(points.iter().flat_map(|p| [p.who, 0, 0, 0]));
+        list[0] = count as u32;
+        list.extend(particles.flat_map(|who| [who, 0, 0, 0]));
         self.context
             .write(&self.buffers.found, bytemuck::cast_slice(&list));
-        self.announce_gathering(points.len());
-        let bytes = (points.len() * self.space.dimensions() * 4) as u64;
+        self.announce_gathering(count);
+        let bytes = (count * self.space.dimensions() * 4) as u64;
         self.context.run_and_read_back(
-            |encoder| self.record_gather(encoder, points.len()),
+            |encoder| self.record_gather(encoder, group, count),
             &[(&self.buffers.rows, 0..bytes)],
             &self.buffers.readback,
             bytemuck::pod_collect_to_vec,
@@ -521,8 +628,14 @@ impl DeviceMopso {
     /// The first half of [`DeviceMopso::step`].
     ///
     /// # Errors
-    /// [`Error::Device`] if the device fails.
+    /// [`Error::Device`] if the device fails, [`Error::Input`] if `objectives` have constraints and the swarm does not, or the other
+    /// way.
     pub fn evaluate(&mut self, objectives: &mut dyn DeviceObjectives) -> Result<()> {
+        if objectives.is_constrained() != self.constrained {
+            let found = format!("is_constrained() = {}", objectives.is_constrained());
+            let expected = format!("{}, as when the swarm was made", self.constrained);
+            return Err(Error::input("the objectives", "constraints", found, expected));
+        }
         let n = self.settings.motion.population;
         objectives.evaluate(n, &self.buffers.position, &self.buffers.objectives)
     }
@@ -537,19 +650,26 @@ impl DeviceMopso {
         let Newcomers {
             points,
             rows,
+            violation,
             failures,
         } = self.learn()?;
         let position = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect();
         let solutions = points.into_iter().zip(rows.chunks_exact(d).map(position));
         let generation = self.generation(members);
         let solutions = solutions.collect();
-        take_in(&mut self.archive, &mut self.earnings, &generation, solutions, 0.0);
+        take_in(
+            &mut self.archive,
+            &mut self.earnings,
+            &generation,
+            solutions,
+            violation,
+        );
         self.counters.told(self.settings.motion.population);
-        let leaders = leaders(&mut self.archive);
+        let leaders = self.leaders()?;
         self.context
             .write(&self.buffers.archive, bytemuck::cast_slice(&leaders));
         // The host goes on meanwhile: the evaluation that follows waits for it.
-        self.announce(self.archive.len());
+        self.announce(leaders.len() / d, self.archive.violation());
         let groups = sliced_groups(&self.context, self.settings.motion.population, d);
         self.context
             .run_ahead(|encoder| self.record_groups(encoder, &self.kernels.advance, groups))?;
@@ -562,6 +682,25 @@ impl DeviceMopso {
             failed: failures.values().sum::<u64>() as usize,
             failures,
         })
+    }
+
+    /// The positions that lead and mate, as on the host.
+    fn leaders(&mut self) -> Result<Vec<f32>> {
+        let mut leading = leaders(&mut self.archive);
+        if !self.constrained || !StandIns::are_possible(&self.archive, &self.settings) {
+            return Ok(leading);
+        }
+        let n = self.settings.motion.population;
+        let bytes = n.next_multiple_of(BLOCK) * self.rows() * 4;
+        let bests: Vec<f32> = self.read(&self.buffers.best_objectives, bytes as u64)?;
+        let violations = last_row(&bests, n, self.rows());
+        let stand_ins = StandIns::draw(&self.archive, &self.settings, self.counters, &violations);
+        if stand_ins.instead_of_members {
+            leading.clear();
+        }
+        let particles = stand_ins.particles.iter().map(|particle| *particle as u32);
+        leading.extend(self.gather(&self.buffers.gather_bests, particles)?);
+        Ok(leading)
     }
 
     /// Steps until the planned iterations are done or `observe` returns `Break`.
@@ -604,10 +743,16 @@ impl DeviceMopso {
     /// # Errors
     /// [`Error::Device`] if the device fails.
     pub fn objectives(&self) -> Result<Vec<f64>> {
-        let (n, width) = (self.settings.motion.population, self.objectives);
-        let bytes = n.next_multiple_of(BLOCK) * width * 4;
-        let rows: Vec<f32> = self.read(&self.buffers.objectives, bytes as u64)?;
-        Ok(row_major(&rows, n, width))
+        let n = self.settings.motion.population;
+        let bytes = n.next_multiple_of(BLOCK) * self.rows() * 4;
+        let blocks: Vec<f32> = self.read(&self.buffers.objectives, bytes as u64)?;
+        let rows = row_major(&blocks, n, self.rows());
+        let width = self.objectives;
+        Ok(rows
+            .chunks_exact(self.rows())
+            .flat_map(|row| &row[..width])
+            .copied()
+            .collect())
     }
 
     /// Iterations done.

@@ -19,6 +19,7 @@ mod shaders;
 mod steady;
 mod step;
 mod swarm;
+mod swarm_constrained;
 mod swarm_lines;
 mod swarm_resident;
 mod tuning;
@@ -40,6 +41,7 @@ fn main() -> std::process::ExitCode {
         steady::tests(),
         step::tests(),
         swarm::tests(),
+        swarm_constrained::tests(),
         swarm_lines::tests(),
         swarm_resident::tests(),
         tuning::tests(),

@@ -291,6 +291,8 @@ fn a_generation_has_the_hosts_offsets() {
         signed,
         per_dimension,
         tournament,
+        constrained,
+        violation,
         inertia,
         cognitive,
         social,

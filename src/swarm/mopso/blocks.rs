@@ -53,6 +53,10 @@ pub struct Generation {
     pub per_dimension: u32,
     /// Whether leaders are the better of two.
     pub tournament: u32,
+    /// Whether particles on a device have a row for what they violate constraints by.
+    pub constrained: u32,
+    /// By how much the members of the archive do.
+    pub violation: f32,
     /// Inertia.
     pub inertia: f32,
     /// Pull to the own best.
@@ -112,6 +116,8 @@ impl Generation {
             signed: u32::from(motion.constriction == Constriction::Signed),
             per_dimension: u32::from(motion.randomness == Randomness::PerDimension),
             tournament: u32::from(settings.leaders == Leaders::Tournament),
+            constrained: 0,
+            violation: 0.0,
             inertia: inertia as f32,
             cognitive: cognitive as f32,
             social: social as f32,

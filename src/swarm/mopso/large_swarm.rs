@@ -7,6 +7,7 @@
 use super::blocks::{Generation, UNKNOWN, advance, judge, scatter};
 use super::earnings::Earnings;
 use super::filter::{Point, front, part, point};
+use super::stand_ins::StandIns;
 use super::thinning::{PER_PLACE, thinned};
 use crate::error::Result;
 use crate::evaluate::resident::BLOCK;
@@ -18,7 +19,6 @@ use crate::swarm::archive::Archive;
 #[cfg(feature = "gpu")]
 use crate::swarm::device::DeviceState;
 use crate::swarm::metrics::dominates;
-use crate::swarm::motion::Purpose;
 use crate::swarm::settings::{MopsoSettings, setting};
 use crate::swarm::space::Space;
 use crate::swarm::{Counters, Front, Optimiser};
@@ -249,13 +249,14 @@ impl LargeSwarm {
         Ok(())
     }
 
-    /// What a device holds of the swarm; nothing if it knows of violations, which a device does not.
+    /// What a device holds of the swarm; nothing if it knows of violations, which are single precision there.
     #[cfg(feature = "gpu")]
     pub fn to_device(&self) -> Option<DeviceState> {
         self.best_violation.is_empty().then(|| DeviceState {
             settings: self.settings.clone(),
             space: self.space.clone(),
             objectives: self.objectives,
+            constrained: false,
             position: self.position.clone(),
             velocity: self.velocity.clone(),
             best_position: self.best_position.clone(),
@@ -269,6 +270,8 @@ impl LargeSwarm {
     /// The swarm that a device has held.
     #[cfg(feature = "gpu")]
     pub fn from_device(state: DeviceState) -> Self {
+        let best_violation = state.best_violation();
+        let best_objectives = state.best_costs();
         Self {
             random: Random::new(state.settings.motion.seed),
             settings: state.settings,
@@ -277,8 +280,8 @@ impl LargeSwarm {
             position: state.position,
             velocity: state.velocity,
             best_position: state.best_position,
-            best_objectives: state.best_objectives,
-            best_violation: Vec::new(),
+            best_objectives,
+            best_violation,
             archive: state.archive,
             earnings: state.earnings,
             counters: state.counters,
@@ -395,36 +398,14 @@ impl LargeSwarm {
         told.fold(self.archive.violation(), f64::min)
     }
 
-    /// The positions that lead and mate, the best first: the archive's, and own bests of particles that are drawn. As in a small swarm,
-    /// own bests stand in for all members while nothing feasible is known, of two each the one that violates less. While constraints
-    /// leave the archive less than half full, they stand in for the members that it lacks.
+    /// The positions that lead and mate, the best first: the archive's, and own bests that stand in for members.
     fn leaders(&mut self) -> Vec<f32> {
         let mut leading = leaders(&mut self.archive);
-        let (members, wanted) = (self.archive.len(), self.settings.archive);
-        let infeasible = self.archive.violation() > 0.0;
-        let violates = |violation: &f64| *violation > 0.0 && violation.is_finite();
-        let few = 2 * members < wanted && self.best_violation.iter().any(violates);
-        if members == 0 || self.best_violation.is_empty() || !(infeasible || few) {
-            return leading;
-        }
-        let (when, n) = (self.counters.iteration as u32, self.settings.motion.population);
-        let draw = |place: usize| {
-            let drawn = |index| {
-                self.random
-                    .below(n, Purpose::Leader as u32, when, place as u32, index)
-            };
-            let [first, second] = [0, 1].map(drawn);
-            let second_leads = infeasible && self.best_violation[second] < self.best_violation[first];
-            if second_leads { second } else { first }
-        };
-        let mut drawn: Vec<usize> = if infeasible {
+        let stand_ins = StandIns::draw(&self.archive, &self.settings, self.counters, &self.best_violation);
+        if stand_ins.instead_of_members {
             leading.clear();
-            (0..wanted).map(draw).collect()
-        } else {
-            (members..wanted).map(draw).collect()
-        };
-        drawn.sort_by(|&a, &b| self.best_violation[a].total_cmp(&self.best_violation[b]));
-        for particle in drawn {
+        }
+        for particle in stand_ins.particles {
             let coordinates = 0..self.space.dimensions();
             leading.extend(coordinates.map(|k| self.best_position[self.place(particle, k)]));
         }

@@ -5,6 +5,7 @@ pub(super) mod earnings;
 pub(super) mod filter;
 pub(super) mod large_swarm;
 mod small_swarm;
+pub(super) mod stand_ins;
 pub(super) mod thinning;
 
 use super::archive::Archive;
