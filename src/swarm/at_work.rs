@@ -95,7 +95,10 @@ impl<'a> SwarmAtWork<'a> {
                 let context = GpuContext::shared(adapter)?;
                 let objectives = GpuBackend::new(kind, context.clone())?;
                 let state = swarm.alone().and_then(Mopso::to_device).ok_or_else(|| {
-                    Error::Study("only one swarm, in single precision, goes to a device".to_owned())
+                    Error::Study(
+                        "only one swarm, in single precision and without constraints, goes to a device"
+                            .to_owned(),
+                    )
                 })?;
                 Ok((DeviceMopso::from_state(state, context)?, Box::new(objectives)))
             };

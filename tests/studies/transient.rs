@@ -317,6 +317,35 @@ fn each_corner_has_the_grip_that_the_car_holds_there() {
     assert_eq!(resumed.drive.states, whole.drive.states);
 }
 
+/// A line that bends too much for the steering lock is driven with the least grip first: lost there, it is lost. No other share is tried.
+#[test]
+fn a_line_beyond_the_steering_lock_is_refused_at_once() {
+    let road = set_up(&RacelineSettings {
+        track: "circle:10:6".to_owned(),
+        sections: Some(60),
+        ..RacelineSettings::default()
+    });
+    let road = road.expect("a circle");
+    let points = road.cross_sections.points(&road.cross_sections.reference);
+    let prepared = Prepared {
+        car: Car::bundled().expect("the bundled car"),
+        lines: vec![NamedLine::new("middle".to_owned(), points, &road, 2.0).expect("a line")],
+        road,
+        motor: None,
+    };
+    let mut state_file = StateFile::idle();
+    let settings = TransientSettings::default();
+    let mut steps = 0;
+    let lost = solve::<Transient>(&settings, &prepared, (None, &mut state_file), |_| {
+        steps += 1;
+        ControlFlow::Continue(())
+    });
+    let said = lost.map(drop).expect_err("it is too tight").to_string();
+    let words = ["at 0.30: ", "radius of 8.0 m", "on its steering lock"];
+    assert!(words.iter().all(|word| said.contains(word)), "{said}");
+    assert_eq!(steps, 0, "{said}");
+}
+
 /// Set-ups on two lines: the fastest within the edges comes first, the car as it is on a line laps as that line driven alone
 /// with the same share of the grip, and a search can be broken off.
 #[test]

@@ -192,6 +192,16 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         return raise(parts, &shares, base, &mut state, state_file, observe);
     }
     let planned = shares.len();
+    let beyond_lock = beyond_lock(car, points_m)?;
+    // A car that leaves such a line with the least grip, at its slowest, leaves it with any.
+    if state.tried == 0
+        && !beyond_lock.is_empty()
+        && let Some(least) = shares.last()
+        && let Err(Error::Study(why)) = attempt(*least)
+    {
+        state.failures.push((*least, why));
+        state.tried = planned;
+    }
     // A few at once: the greatest that works ends the search.
     let together = rayon::current_num_threads().max(2);
     while state.tried < planned {
@@ -248,9 +258,8 @@ fn greatest_share(work: Work<'_, Transient>) -> Result<Option<DrivenLine>> {
         .last()
         .map_or(String::new(), |(share, why)| format!(" (at {share:.2}: {why})"));
     Err(Error::Study(format!(
-        "the car does not get round the line with any share of the envelope's grip that was tried{last}; {}a line with more room \
-         to the edges (found for a wider car), or through more sections, is easier to drive",
-        beyond_lock(car, points_m)?
+        "the car does not get round the line with any share of the envelope's grip that was tried{last}; {beyond_lock}a line with \
+         more room to the edges (found for a wider car), or through more sections, is easier to drive"
     )))
 }
 
