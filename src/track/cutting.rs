@@ -4,6 +4,10 @@
 //! neighbouring normals cross before they reach the edge. Such cross-sections are turned, all of a neighbourhood at once, until
 //! they no longer cross: the turning is spread over a longer stretch by diffusion, and each turned cross-section ends where it
 //! meets the edge.
+//!
+//! The normals of a survey waver by some degrees where its points are off by some centimetres. Heights along them waver as well: 5 m from
+//! the reference line on a slope of 5 %, 3 degrees are 13 mm, and such waves of 5 m take all load off a car at 37 m/s. So on a road with
+//! height, cross-sections are turned to directions that change smoothly.
 
 use super::circuit::Circuit;
 use super::circuit::in_a_zone;
@@ -13,7 +17,7 @@ use super::relief::SectionRelief;
 use super::road::{Road, RoadFrame, even_stations, spread};
 use crate::scalar::bisected;
 use crate::{Error, Place, Result};
-use glam::DVec2;
+use glam::{DMat3, DVec2, DVec3};
 
 /// Greatest turn of a cross-section from the normal (rad).
 const FURTHEST_TURN_RAD: f64 = 0.6;
@@ -21,6 +25,11 @@ const FURTHEST_TURN_RAD: f64 = 0.6;
 const ROUNDS: usize = 300;
 /// Step of the reference line against which the ends of turned cross-sections are found (m).
 const FINE_M: f64 = 0.5;
+/// Half of the stretch over which directions are made smooth on a road with height (m), and how many cross-sections it must have.
+const SMOOTHED_M: f64 = 25.0;
+const SMOOTHED: usize = 7;
+/// Turn from the normal up to which a reference line is smooth as it is (rad).
+const SMOOTH_RAD: f64 = 0.01;
 /// Least gap between the ends of turned neighbours, as a share of the step between the cross-sections.
 const LEAST_STEP: f64 = 0.02;
 
@@ -38,6 +47,9 @@ impl Circuit {
 /// Cross-sections across a road, as [`Circuit::cross_sections_spaced`].
 pub(super) fn cross_sections(road: &dyn Road, count: usize) -> Result<CrossSections> {
     let mut cutter = Cutter::new(road, spread(road, count)?)?;
+    if cutter.has_height() {
+        cutter.even_out();
+    }
     cutter.mend()?;
     cutter.check_edges()?;
     let share = |(frame, &[right, left]): (&RoadFrame, &Stretch)| {
@@ -192,6 +204,70 @@ impl<'a> Cutter<'a> {
             }
         }
         Ok(near)
+    }
+
+    fn has_height(&self) -> bool {
+        let heights = self.frames.iter().map(|frame| frame.surface.z_m);
+        heights.clone().fold(f64::NEG_INFINITY, f64::max) > heights.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Turns all cross-sections to smooth directions, if those of the reference line are not smooth.
+    fn even_out(&mut self) {
+        let turns = self.turns_to_smooth();
+        if turns.iter().all(|turn| turn.abs() <= SMOOTH_RAD) {
+            return;
+        }
+        for (i, turn) in turns.into_iter().enumerate() {
+            self.turned[i] = turn.clamp(-FURTHEST_TURN_RAD, FURTHEST_TURN_RAD);
+            match self.slanted(i) {
+                Some(ends) => self.ends[i] = ends,
+                None => self.turned[i] = 0.0,
+            }
+        }
+    }
+
+    /// The turn of each cross-section (rad) to the parabola that fits the directions of those about it best.
+    fn turns_to_smooth(&self) -> Vec<f64> {
+        let n = self.frames.len() as isize;
+        let closed = self.road.closed();
+        let at = |i: isize| i.rem_euclid(n) as usize;
+        let turn = |i: isize| {
+            let here = self.frames[at(i)].tangent;
+            let (mut products, mut sums, mut count) = (DMat3::ZERO, DVec3::ZERO, 0);
+            for way in [-1, 1] {
+                // The last direction that was added, and what it differs from that of the cross-section.
+                let (mut last, mut heading) = (here, 0.0);
+                for k in 0..n / 2 {
+                    let j = i + way * k;
+                    if !closed && !(0..n).contains(&j) {
+                        break;
+                    }
+                    let away = self.apart(self.stations[at(i)], self.stations[at(j)]) / SMOOTHED_M;
+                    if away >= 1.0 {
+                        break;
+                    }
+                    let tangent = self.frames[at(j)].tangent;
+                    heading += last.angle_to(tangent);
+                    last = tangent;
+                    // The cross-section itself counts once.
+                    if way == 1 && k == 0 {
+                        continue;
+                    }
+                    let place = way as f64 * away;
+                    let powers = DVec3::new(1.0, place, place * place);
+                    let weight = (1.0 - away * away).powi(2);
+                    products += DMat3::from_cols(powers, place * powers, place * place * powers) * weight;
+                    sums += weight * heading * powers;
+                    count += 1;
+                }
+            }
+            if count < SMOOTHED {
+                return 0.0;
+            }
+            let fitted = (products.inverse() * sums).x;
+            if fitted.is_finite() { fitted } else { 0.0 }
+        };
+        (0..n).map(turn).collect()
     }
 
     fn mend(&mut self) -> Result<()> {

@@ -225,7 +225,9 @@ impl Study for Transient {
                 summary.disagreement_percent
             ))),
             Summary::Population(summary) if summary.best.is_none() => Err(Error::Study(
-                "no set-up stays within the edges of any line with any share of the grip".to_owned(),
+                "no set-up stays within the edges of any line with any share of the grip that was tried; a line with more room to \
+                 the edges (found for a wider car) is easier to drive, and so are smaller shares"
+                    .to_owned(),
             )),
             _ => Ok(()),
         }
