@@ -4,8 +4,10 @@
 //! that no member of the archive dominates or equals; the host keeps the archive. On a device that rounds as the
 //! processor does, the swarm is the one that [`super::Mopso`] keeps in lanes, bit for bit.
 
+mod buffers;
+mod state;
+
 use super::archive::Archive;
-use super::checkpoint::Checkpoint;
 use super::mopso::blocks::{Generation, UNKNOWN};
 use super::mopso::earnings::Earnings;
 use super::mopso::filter::{Point, front};
@@ -16,17 +18,18 @@ use super::settings::MopsoSettings;
 use super::space::Space;
 use super::{Counters, Front, Progress};
 use crate::error::{Error, Result};
-use crate::evaluate::gpu::shader::{swarm, swarm_gather};
-use crate::evaluate::gpu::{Binding, GpuContext, Kernel};
+use crate::evaluate::gpu::{GpuContext, Kernel};
 use crate::evaluate::resident::{groups, sliced_groups};
 use crate::evaluate::{BackendInfo, Failure, FailureCounts, Problem};
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use wgpu::BufferUsages as Usage;
 
 pub use crate::evaluate::resident::{BLOCK, DeviceObjectives};
+pub use state::DeviceState;
+
+use buffers::{Buffers, Kernels, on_device};
+use state::last_row;
 
 /// Failures that are told apart.
 const REASONS: usize = 14;
@@ -56,66 +59,6 @@ fn row_major(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
     (0..n * width).map(|j| at(j / width, j % width)).collect()
 }
 
-/// The last row of blocks of `width` rows for `n` particles; infinite where nothing is known.
-fn last_row(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
-    let rows = blocks.chunks_exact(BLOCK * width);
-    let last = rows.flat_map(|block| &block[BLOCK * (width - 1)..]);
-    let known = last.take(n).map(|x| match *x < UNKNOWN {
-        true => f64::from(x.max(0.0)),
-        false => f64::INFINITY,
-    });
-    known.collect()
-}
-
-/// A swarm off its device, for [`super::checkpoint`].
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct DeviceState {
-    pub(super) settings: MopsoSettings,
-    pub(super) space: Space,
-    pub(super) objectives: usize,
-    pub(super) constrained: bool,
-    pub(super) position: Vec<f32>,
-    pub(super) velocity: Vec<f32>,
-    pub(super) best_position: Vec<f32>,
-    /// With a row for violations behind those of the objectives, if there are constraints.
-    pub(super) best_objectives: Vec<f32>,
-    pub(super) archive: Archive,
-    pub(super) earnings: Earnings,
-    pub(super) counters: Counters,
-}
-
-impl DeviceState {
-    /// Rows of objectives of a particle.
-    fn rows(&self) -> usize {
-        self.objectives + usize::from(self.constrained)
-    }
-
-    /// The objectives of own bests, in blocks.
-    pub(super) fn best_costs(&self) -> Vec<f32> {
-        let blocks = self.best_objectives.chunks_exact(BLOCK * self.rows());
-        blocks
-            .flat_map(|block| &block[..BLOCK * self.objectives])
-            .copied()
-            .collect()
-    }
-
-    /// By how much own bests violate the constraints, if there are any.
-    pub(super) fn best_violation(&self) -> Vec<f64> {
-        if !self.constrained {
-            return Vec::new();
-        }
-        last_row(
-            &self.best_objectives,
-            self.settings.motion.population,
-            self.rows(),
-        )
-    }
-}
-
-impl Checkpoint for DeviceState {
-    const KIND: &'static str = "swarm of a device";
-}
-
 /// The particles that may enter the archive.
 struct Noted {
     count: usize,
@@ -137,32 +80,6 @@ struct Newcomers {
     /// By how much all of them violate the constraints.
     violation: f64,
     failures: FailureCounts,
-}
-
-struct Kernels {
-    learn: Arc<Kernel>,
-    note: Arc<Kernel>,
-    advance: Arc<Kernel>,
-    gather: Arc<Kernel>,
-}
-
-struct Buffers {
-    generation: wgpu::Buffer,
-    archive: wgpu::Buffer,
-    position: wgpu::Buffer,
-    velocity: wgpu::Buffer,
-    best_position: wgpu::Buffer,
-    best_objectives: wgpu::Buffer,
-    objectives: wgpu::Buffer,
-    found: wgpu::Buffer,
-    /// As large as the largest of what is read back.
-    readback: wgpu::Buffer,
-    gathering: wgpu::Buffer,
-    rows: wgpu::Buffer,
-    swarm: wgpu::BindGroup,
-    /// Gathers positions, and own bests.
-    gather: wgpu::BindGroup,
-    gather_bests: wgpu::BindGroup,
 }
 
 /// A swarm of one to three objectives on a device, with the settings of [`super::Mopso`]. With one objective it is the plain particle
@@ -244,84 +161,7 @@ impl DeviceMopso {
         (objectives, constrained): (usize, bool),
         context: Arc<GpuContext>,
     ) -> Result<(Self, Arc<Kernel>)> {
-        use Binding::{Read, Uniform, Write};
-        let d = space.dimensions();
-        let bindings = [Uniform, Read, Write, Write, Write, Write, Write, Write];
-        let source = swarm();
-        let kernel = |entry: &str| context.kernel(&source, entry, &bindings);
-        let scatter = kernel("scatter")?;
-        let kernels = Kernels {
-            learn: kernel("learn")?,
-            note: kernel("note")?,
-            advance: kernel("advance")?,
-            gather: context.kernel(&swarm_gather(), "gather", &[Uniform, Read, Read, Write])?,
-        };
-        let n = settings.motion.population;
-        let lanes = n.next_multiple_of(BLOCK) as u64;
-        let width = objectives + usize::from(constrained);
-        let (state, worth) = (lanes * d as u64 * 4, lanes * width as u64 * 4);
-        let members = (settings.archive + AT_ONCE) as u64;
-        let most = PER_PLACE * settings.archive;
-        // An own best may stand in for more than one member.
-        let listed = HEADER + lanes.max(settings.archive as u64) * 16;
-        let gathered = (most.max(AT_ONCE) * d) as u64 * 4;
-        let largest = state.max(worth).max(listed + gathered);
-        let room = most_particles(&context, d);
-        if n > room {
-            let found = n.to_string();
-            let expected = format!(
-                "at most {room} particles of {d} variables on {}",
-                context.summary()
-            );
-            return Err(Error::input(
-                "the swarm's settings",
-                "population",
-                found,
-                expected,
-            ));
-        }
-        let on = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
-        let size = size_of::<Generation>() as u64;
-        let generation = context.buffer("generation", size, Usage::UNIFORM | Usage::COPY_DST)?;
-        let leaders = context.buffer("archive", members * d.max(3) as u64 * 4, on)?;
-        let position = context.buffer("positions", state, on)?;
-        let velocity = context.buffer("velocities", state, on)?;
-        let best_position = context.buffer("best positions", state, on)?;
-        let best_objectives = context.buffer("best objectives", worth, on)?;
-        let worths = context.buffer("objectives", worth, on)?;
-        let found = context.buffer("candidates", listed, on)?;
-        let readback = context.buffer("readback", largest, Usage::MAP_READ | Usage::COPY_DST)?;
-        let gathering = context.buffer("gathering", 16, Usage::UNIFORM | Usage::COPY_DST)?;
-        let rows = context.buffer("chosen positions", gathered, on)?;
-        let state = [
-            &generation,
-            &leaders,
-            &position,
-            &velocity,
-            &best_position,
-            &best_objectives,
-            &worths,
-            &found,
-        ];
-        let swarm = context.bind(&scatter, &state)?;
-        let gather = context.bind(&kernels.gather, &[&gathering, &found, &position, &rows])?;
-        let gather_bests = context.bind(&kernels.gather, &[&gathering, &found, &best_position, &rows])?;
-        let buffers = Buffers {
-            generation,
-            archive: leaders,
-            position,
-            velocity,
-            best_position,
-            best_objectives,
-            objectives: worths,
-            found,
-            readback,
-            gathering,
-            rows,
-            swarm,
-            gather,
-            gather_bests,
-        };
+        let (kernels, buffers, scatter) = on_device(&settings, &space, (objectives, constrained), &context)?;
         let swarm = Self {
             archive,
             earnings: Earnings::default(),
@@ -516,9 +356,10 @@ impl DeviceMopso {
             count,
             points: points_of(list, count),
             rows: rows.iter().map(|word| f32::from_bits(*word)).collect(),
-            violation: match self.constrained {
-                true => violation.min(f64::from(f32::from_bits(list[1]))),
-                false => 0.0,
+            violation: if self.constrained {
+                violation.min(f64::from(f32::from_bits(list[1])))
+            } else {
+                0.0
             },
             failures: failures.collect(),
         })

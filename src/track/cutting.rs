@@ -206,6 +206,7 @@ impl<'a> Cutter<'a> {
         Ok(near)
     }
 
+    /// Whether the reference line rises or falls anywhere.
     fn has_height(&self) -> bool {
         let heights = self.frames.iter().map(|frame| frame.surface.z_m);
         heights.clone().fold(f64::NEG_INFINITY, f64::max) > heights.fold(f64::INFINITY, f64::min)
