@@ -246,6 +246,18 @@ impl Archive {
         true
     }
 
+    /// The best in each objective: the ends of the front, which its users look for first. A fixed reference takes their privilege.
+    fn ends(&self) -> impl Iterator<Item = usize> {
+        let privileged = match self.fixed {
+            true => 0,
+            false => self.objectives.first().map_or(0, Vec::len),
+        };
+        (0..privileged).filter_map(|k| {
+            let value = |i: usize| self.objectives[i][k];
+            (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b)))
+        })
+    }
+
     /// The member that contributes least and is not the best in any objective. `without` is what the members contribute without the
     /// last one, while it is open whether that stays.
     fn least(&mut self, without: Option<&[Within]>) -> usize {
@@ -257,14 +269,7 @@ impl Archive {
             true => self.shares.iter().map(|share| share.least).collect(),
             false => self.worth(),
         };
-        // The ends of a front are what its users look for first.
-        let privileged = if self.fixed { 0 } else { self.objectives[0].len() };
-        for k in 0..privileged {
-            let value = |i: usize| self.objectives[i][k];
-            if let Some(end) = (0..self.len()).min_by(|&a, &b| value(a).total_cmp(&value(b))) {
-                worth[end] = f64::INFINITY;
-            }
-        }
+        self.ends().for_each(|end| worth[end] = f64::INFINITY);
         if without.is_some() && worth.last() == Some(&0.0) {
             // Few newcomers stay. What the newest brings is asked for first, and of the others only whether theirs is more.
             worth[self.len() - 1] = -1.0;
@@ -324,12 +329,15 @@ impl Archive {
         }
     }
 
-    /// [`Archive::worth`] for [`Archive::contributes_more`]: nothing where that works it out as it needs it.
+    /// [`Archive::worth`] for [`Archive::leads_before`]. What that works out as it needs it, contributions, is zero; the ends of the
+    /// front are worth more than any.
     pub(super) fn worth_at_once(&self) -> Vec<f64> {
-        match self.by_contribution() {
-            true => Vec::new(),
-            false => self.worth(),
+        if !self.by_contribution() {
+            return self.worth();
         }
+        let mut worth = vec![0.0; self.len()];
+        self.ends().for_each(|end| worth[end] = f64::INFINITY);
+        worth
     }
 
     /// How much each member contributes, by the measure that truncation uses.
@@ -347,9 +355,9 @@ impl Archive {
         }
     }
 
-    /// Whether a member contributes more than another, by `worth` where that is not by contribution.
-    pub(super) fn contributes_more(&mut self, worth: &[f64], one: usize, other: usize) -> bool {
-        if !self.by_contribution() {
+    /// Whether a member contributes more than another, or is an end of the front as the other is not, by [`Archive::worth_at_once`].
+    pub(super) fn leads_before(&mut self, worth: &[f64], one: usize, other: usize) -> bool {
+        if !self.by_contribution() || worth[one] != worth[other] {
             return worth[one] > worth[other];
         }
         let (mut more, less) = (self.shares[one], self.shares[other]);
@@ -589,7 +597,7 @@ mod tests {
                     fixed.insert(&p, &p);
                     let (one, other) = (archive.len() - 1, archive.len() / 2);
                     let worth = archive.worth_at_once();
-                    archive.contributes_more(&worth, one, other);
+                    archive.leads_before(&worth, one, other);
                 }
                 for archive in [archive, fixed] {
                     assert!((1..=12).contains(&archive.len()));
@@ -599,19 +607,28 @@ mod tests {
         }
     }
 
-    /// Which of two contributes more is found without knowing either exactly.
+    /// Which of two contributes more is found without knowing either exactly, and ends of the front lead before all others.
     #[test]
-    fn contributes_more_by_bounds() {
+    fn leads_by_bounds_and_at_the_ends() {
         for width in [2, 3, 4, 5] {
             let mut archive = Archive::new(15, Truncation::Contribution);
             for (n, p) in points(width as u32, 300).into_iter().enumerate() {
                 archive.insert(&p, &p);
                 let (one, other) = (n % archive.len(), n * 7 % archive.len());
-                let worth = contributions(&archive.objectives, &archive.reference).unwrap();
+                let mut worth = contributions(&archive.objectives, &archive.reference).unwrap();
                 let within = 1e-12 * archive.reference.iter().product::<f64>();
+                for k in 0..width {
+                    let least = archive
+                        .objectives
+                        .iter()
+                        .map(|row| row[k])
+                        .fold(f64::INFINITY, f64::min);
+                    let end = archive.objectives.iter().position(|row| row[k] == least).unwrap();
+                    worth[end] = f64::INFINITY;
+                }
                 if (worth[one] - worth[other]).abs() > within {
-                    let more = archive.contributes_more(&[], one, other);
-                    assert_eq!(more, worth[one] > worth[other], "{worth:?}: {one}, {other}");
+                    let leads = archive.leads_before(&archive.worth_at_once(), one, other);
+                    assert_eq!(leads, worth[one] > worth[other], "{worth:?}: {one}, {other}");
                 }
             }
         }

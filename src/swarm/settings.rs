@@ -255,9 +255,9 @@ impl Mutation {
 pub struct MopsoSettings {
     /// The motion's settings. A difference move goes from an archive member along the difference of two others
     /// \[7\]. Their share is where the swarm begins: it makes more or fewer of them by what they earn, and crossings of two members
-    /// besides, as genetic algorithms do. A share of zero or one stays. The particles' own bests take the members' places in these
-    /// moves while constraints leave the archive less than half full; in a swarm of [`super::MANY`] particles and more, the places of
-    /// those that it lacks.
+    /// besides, as genetic algorithms do. A share of zero or one stays. In these moves the particles' own bests stand in for the members
+    /// that the archive lacks, and for all of them while constraints leave it less than half full. In a swarm of [`super::MANY`] particles
+    /// and more they do so only while constraints leave it less than half full, for those that it lacks.
     pub motion: PsoSettings,
     /// Most members of the archive.
     pub archive: usize,
@@ -266,7 +266,9 @@ pub struct MopsoSettings {
     /// The reference point of contributions, a value for each of up to five objectives. The archive's hypervolume up to this
     /// point then never falls. With `None` the archive chooses the point and keeps the ends of its front.
     pub reference: Option<Vec<f64>>,
-    /// Choice of leaders. They are own bests while nothing feasible is known: of two at random the one that violates less.
+    /// Choice of leaders. They are own bests while nothing feasible is known: of two at random the one that violates less. Where
+    /// members leave by contribution and no reference is given, the ends of the front win every tournament of a swarm of fewer
+    /// than [`super::MANY`] particles.
     pub leaders: Leaders,
 }
 

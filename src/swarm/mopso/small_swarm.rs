@@ -98,7 +98,7 @@ impl SmallSwarm {
             Leaders::Random => first,
             Leaders::Tournament => {
                 let second = draw(1);
-                if self.archive.contributes_more(worth, second, first) {
+                if self.archive.leads_before(worth, second, first) {
                     second
                 } else {
                     first
@@ -107,27 +107,34 @@ impl SmallSwarm {
         }
     }
 
-    /// The parents that a leader's mates are drawn from, as [`parent`] counts them: the archive's members, or the particles' own bests
-    /// where constraints leave few members.
+    /// The parents that a leader's mates are drawn from, as [`parent`] counts them: the archive's members, and own bests for those that
+    /// it lacks. The first few members are close together, and a swarm bred from them alone gathers in their hollow. Where constraints
+    /// leave few members, only own bests.
     fn mates(&self) -> Range<usize> {
         let members = self.archive.len();
+        let wanted = self.settings.archive.min(self.particles.count);
         let violates = |violation: &f64| *violation > 0.0 && violation.is_finite();
-        let few = 2 * members < self.settings.archive.min(self.particles.count);
         let infeasible = self.archive.violation() > 0.0;
-        if infeasible || few && self.best_violation.iter().any(violates) {
+        if infeasible || 2 * members < wanted && self.best_violation.iter().any(violates) {
             members..members + self.particles.count
         } else {
-            0..members
+            0..members.max(wanted)
         }
     }
 
+    /// The mate of that number among them: a member where a particle has no own best yet.
+    fn mate(&self, mates: &Range<usize>, number: usize) -> usize {
+        let (mate, members) = (mates.start + number, self.archive.len());
+        let unknown = mate >= members && self.best_violation[mate - members].is_infinite();
+        if unknown { mate % members } else { mate }
+    }
+
     /// From the leader along the difference of two mates, in some of the coordinates or in all \[7\].
-    fn difference_move(&mut self, particle: usize, leader: usize) {
+    fn difference_move(&mut self, particle: usize, leader: usize, mates: &Range<usize>) {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
         let purpose = Purpose::Difference as u32;
         let pick = |index: u32, count: usize| self.random.below(count, purpose, when, who, index);
-        let mates = self.mates();
-        let [first, second] = [0, 1].map(|index| mates.start + pick(index, mates.len()));
+        let [first, second] = [0, 1].map(|index| self.mate(mates, pick(index, mates.len())));
         let [from, first, second] =
             [leader, first, second].map(|m| parent(&self.archive, &self.best_position, m));
         let row = self.particles.row(particle);
@@ -147,15 +154,14 @@ impl SmallSwarm {
 
     /// To a place between or about the leader and a mate, each coordinate by itself, disturbed by polynomial mutation, as the
     /// children of genetic algorithms \[5\]. A few of the mutations go anywhere.
-    fn crossing(&mut self, particle: usize, leader: usize) {
+    fn crossing(&mut self, particle: usize, leader: usize, mates: &Range<usize>) {
         let (when, who) = (self.counters.iteration as u32, particle as u32);
         let uniform = |purpose: Purpose, index: u32| self.random.uniform(purpose as u32, when, who, index);
-        let mates = self.mates();
         let drawn = self
             .random
             .below(mates.len(), Purpose::Recombine as u32, when, who, 4);
         let [one, other] =
-            [leader, mates.start + drawn].map(|m| parent(&self.archive, &self.best_position, m));
+            [leader, self.mate(mates, drawn)].map(|m| parent(&self.archive, &self.best_position, m));
         let share = 1.0 / self.particles.dimensions() as f64;
         for (k, i) in self.particles.row(particle).enumerate() {
             let drawn = |index: u32| uniform(Purpose::Recombine, 8 + 4 * k as u32 + index);
@@ -178,6 +184,7 @@ impl SmallSwarm {
     fn advance(&mut self) {
         let share = self.counters.iteration as f64 / (self.settings.motion.iterations.max(2) - 1) as f64;
         let worth = self.archive.worth_at_once();
+        let mates = self.mates();
         for particle in 0..self.settings.motion.population {
             if self.archive.is_empty() {
                 // Nobody knows anything yet.
@@ -187,10 +194,10 @@ impl SmallSwarm {
                 let leader = self.leader(&worth, particle);
                 match self.choice(&self.earnings, particle) {
                     Move::Crossing => {
-                        self.crossing(particle, leader);
+                        self.crossing(particle, leader, &mates);
                         continue;
                     }
-                    Move::Difference => self.difference_move(particle, leader),
+                    Move::Difference => self.difference_move(particle, leader, &mates),
                     Move::Pull => {
                         let own = &self.best_position[self.particles.row(particle)];
                         self.particles.one(particle).pull(

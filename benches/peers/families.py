@@ -1,7 +1,9 @@
-"""Compares `lapswarm.minimise` with pymoo's optimisers on constrained problems of pymoo that nothing in lapswarm was chosen by.
+"""Compares `lapswarm.minimise` with pymoo's optimisers on families of problems that are not in lapswarm's suites.
 
-    pip install ./python pymoo==0.6.2 moocore==0.3.2
-    python benches/peers/constrained.py --seeds 5 --families mw,g
+    pip install ./python pymoo==0.6.2 moocore==0.3.2 coco-experiment==2.8.2
+    python benches/peers/families.py --seeds 5 --families mw,g
+
+They are constrained problems of pymoo, and COCO's `bbob-biobj` with ten variables (`biobj`): 55 pairs of ten functions.
 
 25,000 evaluations for several objectives, with populations and archives of 100; 100,000 for one. Settings are the defaults of
 both. Hypervolumes are moocore's, on the scale of the front of all that was found in this run, with the reference at 1.1. A run
@@ -12,6 +14,7 @@ import argparse
 import time
 import warnings
 
+import cocoex
 import lapswarm
 import moocore
 import numpy as np
@@ -19,16 +22,38 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.algorithms.moo.sms import SMSEMOA
 from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.algorithms.soo.nonconvex.isres import ISRES
+from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from pymoo.problems import many, multi, single
 
 SEVERAL, ONE = 25_000, 100_000
+
+
+class Coco(Problem):
+    """A problem of COCO."""
+
+    def __init__(self, problem):
+        super().__init__(n_var=problem.dimension, n_obj=2, xl=problem.lower_bounds, xu=problem.upper_bounds)
+        self.problem = problem
+        self.title = " and ".join(f"f{int(part[6:9])}" for part in problem.name.split("__"))
+
+    def _evaluate(self, x, out, *args, **kwargs):
+        out["F"] = np.array([self.problem(row) for row in x])
+
+
+def coco(instance):
+    """One after the other: a suite of COCO frees a problem when it hands out the next."""
+    for problem in cocoex.Suite("bbob-biobj", "", f"dimensions:10 instance_indices:{instance}"):
+        yield Coco(problem)
+
+
 FAMILIES = {
     "mw": lambda: [getattr(multi, f"MW{i}")() for i in range(1, 15)],
     "ctp": lambda: [getattr(multi, f"CTP{i}")() for i in range(1, 9)],
     "dascmop": lambda: [getattr(multi, f"DASCMOP{i}")(3) for i in range(1, 10)],
     "dcdtlz": lambda: [getattr(many, f"DC{i}DTLZ{j}")() for i in (1, 2, 3) for j in (1, 3)],
     "g": lambda: [getattr(single, f"G{i}")() for i in (*range(1, 12), *range(13, 20), 21, 23, 24)],
+    "biobj": lambda: coco(1),
 }
 # The members that NSGA-II and SMS-EMOA have.
 MEMBERS = 100
@@ -114,7 +139,8 @@ def main():
                 feasible = sum(f is not None for f in found[name])
                 of = f"{feasible} of {arguments.seeds}"
                 said.append(f"{name} {np.median(values):.4g} ({of}, {seconds[name]:.1f} s)")
-            print(f"{family} {type(problem).__name__:9}", " | ".join(said), flush=True)
+            name = getattr(problem, "title", type(problem).__name__)
+            print(f"{family} {name:9}", " | ".join(said), flush=True)
 
 
 if __name__ == "__main__":
