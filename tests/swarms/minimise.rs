@@ -265,8 +265,8 @@ fn hollows_of_coordinates_are_left() {
 }
 
 /// Schaffer's F7 about two places, each turned its own way and stretched up to ten times along the axes. The first members of the archive
-/// are few and near one another. A swarm bred from them alone, whose ends lead no more often than the middle, has medians of 0.897
-/// here.
+/// are few and near one another. A swarm bred from them alone, whose ends lead no more often than the middle, has a median of
+/// 0.897 here.
 #[test]
 fn turned_hollows_are_left() {
     const D: usize = 10;
