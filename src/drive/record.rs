@@ -28,11 +28,14 @@ pub struct Drive {
 
 impl Drive {
     /// Time (s) of a lap of this length (m), sampled at this interval (s). The first sample lies behind the start line and the
-    /// last one before the finish line: the time is corrected for both.
+    /// last one before the finish line: the time is corrected for both. None of a drive that did not reach the finish line.
     pub fn lap_time_s(&self, length_m: f64, interval_s: f64) -> Option<f64> {
         let (first, last) = (self.station_m.first()?, self.station_m.last()?);
         let (from, to) = (self.states.first()?[0], self.states.last()?[0]);
-        Some((self.states.len() - 1) as f64 * interval_s + (length_m - last) / to + first / from)
+        let left_s = (length_m - last) / to;
+        // The next sample would lie behind the finish line.
+        let finished = left_s.abs() < 2.0 * interval_s;
+        finished.then(|| (self.states.len() - 1) as f64 * interval_s + left_s + first / from)
     }
 
     /// Least room between the car's side and an edge (m), of a circuit whose widths are the room that the side has.
@@ -221,4 +224,26 @@ fn record<T: Tyre<f64>>(
         how,
     };
     (log, Some(lost))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A lap of 100 m at 50 m/s takes 2 s, and a drive that ends on its way has no time.
+    #[test]
+    fn only_a_whole_lap_has_a_time() {
+        let whole = Drive {
+            states: vec![[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]; 20],
+            station_m: (0..20).map(|i| 2.5 + 5.0 * f64::from(i)).collect(),
+            ..Drive::default()
+        };
+        let time_s = whole.lap_time_s(100.0, 0.1).unwrap();
+        assert!((time_s - 2.0).abs() < 1e-12, "{time_s}");
+        let mut lost = whole;
+        lost.states.truncate(12);
+        lost.station_m.truncate(12);
+        assert_eq!(lost.lap_time_s(100.0, 0.1), None);
+        assert_eq!(Drive::default().lap_time_s(100.0, 0.1), None);
+    }
 }

@@ -92,6 +92,15 @@ impl Archive {
         }
     }
 
+    /// One like it without members.
+    pub(super) fn emptied(&self) -> Self {
+        let empty = Self::new(self.capacity, self.truncation);
+        match self.fixed {
+            true => empty.measured_from(self.reference.clone()),
+            false => empty,
+        }
+    }
+
     /// The reference point that contributions are measured up to, if it was given.
     pub(super) fn fixed_reference(&self) -> Option<&[f64]> {
         self.fixed.then_some(self.reference.as_slice())

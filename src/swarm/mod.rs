@@ -32,6 +32,8 @@
 //! 7. Storn, Price, *Differential evolution*, J. Global Optimization 11 (1997) (difference moves).
 //! 8. Beume, Naujoks, Emmerich, *SMS-EMOA*, European J. Operational Research 181 (2007) (truncation by contribution).
 //! 9. Zitzler, Laumanns, Thiele, *SPEA2*, TIK report 103 (2001) (truncation by the nearest neighbours).
+//! 10. Fan et al., *Push and pull search for solving constrained multi-objective optimization problems*, Swarm and Evolutionary
+//!     Computation 44 (2019) (constraints that are ignored at first).
 
 mod archive;
 #[cfg(feature = "studies")]

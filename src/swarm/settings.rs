@@ -270,6 +270,9 @@ pub struct MopsoSettings {
     /// members leave by contribution and no reference is given, the ends of the front win every tournament of a swarm of fewer
     /// than [`super::MANY`] particles.
     pub leaders: Leaders,
+    /// Whether half of the particles of a swarm of fewer than [`super::MANY`] ignore constraints at first and take them back step by
+    /// step \[10\]. They ignore them for three tenths of the planned iterations at most, and take them back over half of these.
+    pub push_and_pull: bool,
 }
 
 impl Default for MopsoSettings {
@@ -284,6 +287,7 @@ impl Default for MopsoSettings {
                 ..smpso.motion
             },
             truncation: Truncation::Contribution,
+            push_and_pull: true,
             ..smpso
         }
     }
@@ -311,6 +315,7 @@ impl MopsoSettings {
             truncation: Truncation::Crowding,
             reference: None,
             leaders: Leaders::Tournament,
+            push_and_pull: false,
         }
     }
 
@@ -350,6 +355,7 @@ impl MopsoSettings {
             truncation: Truncation::Crowding,
             reference: None,
             leaders: Leaders::Tournament,
+            push_and_pull: false,
         }
     }
 

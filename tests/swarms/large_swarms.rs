@@ -192,6 +192,7 @@ fn threads_change_nothing() {
             truncation: Truncation::MutualNearest,
             archive: 30,
             reference: None,
+            push_and_pull: false,
         },
     ];
     for variant in variants {

@@ -302,6 +302,84 @@ fn turned_hollows_are_left() {
     assert!(volumes[10] > 0.92, "{volumes:?}");
 }
 
+/// Two objectives about a line, and the square of the distance to that line.
+fn about_a_line(x: &[f64], f: &mut [f64]) -> f64 {
+    let distance: f64 = x[1..].iter().map(|v| (v - x[0]).powi(2)).sum();
+    (f[0], f[1]) = (x[0] + distance, 1.0 - x[0].sqrt() + distance);
+    distance
+}
+
+/// The sorted hypervolumes of eleven seeds, of objectives less `least`, up to 1.1.
+fn constrained_volumes(variables: usize, least: f64, violation: impl Fn(f64) -> f64) -> Vec<f64> {
+    let volume = |seed: u64| {
+        let found = minimise_several(&vec![(0.0, 1.0); variables], 2, |x, f| {
+            f[2] = violation(about_a_line(x, f))
+        });
+        let found = found
+            .constraints(vec![Constraint::at_most_zero()])
+            .evaluations(25_000)
+            .seed(seed);
+        let found = found.run().unwrap();
+        assert!(found.is_feasible());
+        let rows: Vec<Vec<f64>> = found
+            .front
+            .objectives
+            .iter()
+            .map(|row| row.iter().map(|f| f - least).collect())
+            .collect();
+        hypervolume(&rows, &[1.1, 1.1]).unwrap()
+    };
+    let mut volumes: Vec<f64> = (1..=11).map(volume).collect();
+    volumes.sort_by(f64::total_cmp);
+    volumes
+}
+
+/// Between the first candidates and the front, 0.876, lies a wide ring where nothing is feasible. A swarm that keeps to its constraints
+/// from the start finds nothing of the front with ten of these seeds.
+#[test]
+fn infeasible_land_is_crossed() {
+    let volumes = constrained_volumes(20, 0.0, |distance| (distance - 0.02).min(1.2 - distance));
+    assert!(volumes[0] > 0.871, "{volumes:?}");
+}
+
+/// All that is feasible is a thin shell, and the front runs along it. A swarm that keeps to its constraints from the start
+/// has a median of 0.634, and 0.797 at best.
+#[test]
+fn a_thin_shell_is_followed() {
+    let volumes = constrained_volumes(10, 0.299, |distance| (distance - 0.3).abs() - 0.001);
+    assert!(volumes[5] > 0.82, "{volumes:?}");
+}
+
+/// While constraints are ignored, while they come back, and after that.
+#[test]
+fn relaxed_constraints_resume() {
+    let variable = |k: usize| Variable::new(format!("x{k}"), "-", 0.0, 1.0);
+    let problem = Problem {
+        variables: (0..20).map(variable).collect(),
+        ..problem(2)
+    };
+    let function = |x: &[f64], f: &mut [f64]| {
+        let distance = about_a_line(x, f);
+        f[2] = (distance - 0.02).min(1.2 - distance);
+    };
+    let limits = vec![Constraint::at_most_zero()];
+    let mut evaluator = PointEvaluator::constrained(problem.clone(), limits, CallCost::Cheap, function);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("swarm.ckpt");
+    let mut whole = Mopso::new(&problem, MopsoSettings::default().with_size(40, 100)).unwrap();
+    let mut part: Box<dyn Optimiser + Send> = Box::new(whole.clone());
+    for iteration in 0..100 {
+        if [5, 20, 50, 95].contains(&iteration) {
+            save_optimiser(&path, &part).unwrap();
+            part = load_optimiser(&path).unwrap();
+        }
+        let (a, b) = (step(&mut whole, &mut evaluator), step(&mut part, &mut evaluator));
+        assert_eq!(a.unwrap(), b.unwrap(), "{iteration}");
+    }
+    assert_eq!(whole.to_checkpoint().unwrap(), part.to_checkpoint().unwrap());
+    assert!(whole.front().is_feasible());
+}
+
 #[test]
 fn nothing_found_is_told() {
     let found = minimise(&BOUNDS, |_| f64::NAN).evaluations(400).run().unwrap();

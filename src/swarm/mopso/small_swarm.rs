@@ -1,6 +1,7 @@
 //! The small swarm: double precision, one particle after the other.
 
 use super::earnings::{Earnings, Move};
+use super::relaxation::Relaxation;
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
@@ -25,6 +26,10 @@ pub(super) struct SmallSwarm {
     best_objectives: Vec<Vec<f64>>,
     best_violation: Vec<f64>,
     archive: Archive,
+    /// While constraints are relaxed.
+    relaxation: Option<Box<Relaxation>>,
+    /// Whether a candidate has violated them.
+    violated: bool,
     earnings: Earnings,
     counters: Counters,
 }
@@ -42,6 +47,8 @@ impl SmallSwarm {
             best_violation: vec![f64::INFINITY; settings.motion.population],
             objectives: problem.objectives.len(),
             archive: settings.empty_archive(problem.objectives.len())?,
+            relaxation: None,
+            violated: false,
             random,
             particles,
             trials: Trials::default(),
@@ -135,8 +142,9 @@ impl SmallSwarm {
         let purpose = Purpose::Difference as u32;
         let pick = |index: u32, count: usize| self.random.below(count, purpose, when, who, index);
         let [first, second] = [0, 1].map(|index| self.mate(mates, pick(index, mates.len())));
-        let [from, first, second] =
-            [leader, first, second].map(|m| parent(&self.archive, &self.best_position, m));
+        let d = self.particles.dimensions();
+        let parent = |number| parent(&self.archive, &self.best_position, d, number);
+        let [from, first, second] = [leader, first, second].map(parent);
         let row = self.particles.row(particle);
         let always = pick(2, row.len().max(1));
         let whole = self.random.uniform(purpose, when, who, 3) < ALL_COORDINATES;
@@ -160,8 +168,9 @@ impl SmallSwarm {
         let drawn = self
             .random
             .below(mates.len(), Purpose::Recombine as u32, when, who, 4);
-        let [one, other] =
-            [leader, self.mate(mates, drawn)].map(|m| parent(&self.archive, &self.best_position, m));
+        let d = self.particles.dimensions();
+        let parent = |number| parent(&self.archive, &self.best_position, d, number);
+        let [one, other] = [leader, self.mate(mates, drawn)].map(parent);
         let share = 1.0 / self.particles.dimensions() as f64;
         for (k, i) in self.particles.row(particle).enumerate() {
             let drawn = |index: u32| uniform(Purpose::Recombine, 8 + 4 * k as u32 + index);
@@ -181,11 +190,28 @@ impl SmallSwarm {
         }
     }
 
+    /// Whether a particle ignores the constraints as far as they are relaxed.
+    fn is_relaxed(&self, particle: usize) -> bool {
+        self.relaxation.is_some() && !Relaxation::leaves_out(particle)
+    }
+
     fn advance(&mut self) {
+        let relaxed: Vec<bool> = (0..self.particles.count).map(|p| self.is_relaxed(p)).collect();
+        self.advance_some(|particle| !relaxed[particle]);
+        if let Some(mut relaxation) = self.relaxation.take() {
+            std::mem::swap(&mut self.archive, &mut relaxation.archive);
+            self.advance_some(|particle| relaxed[particle]);
+            std::mem::swap(&mut self.archive, &mut relaxation.archive);
+            self.relaxation = Some(relaxation);
+        }
+    }
+
+    /// Moves these particles by the archive.
+    fn advance_some(&mut self, moves: impl Fn(usize) -> bool) {
         let share = self.counters.iteration as f64 / (self.settings.motion.iterations.max(2) - 1) as f64;
         let worth = self.archive.worth_at_once();
         let mates = self.mates();
-        for particle in 0..self.settings.motion.population {
+        for particle in (0..self.settings.motion.population).filter(|particle| moves(*particle)) {
             if self.archive.is_empty() {
                 // Nobody knows anything yet.
                 self.particles
@@ -199,9 +225,10 @@ impl SmallSwarm {
                     }
                     Move::Difference => self.difference_move(particle, leader, &mates),
                     Move::Pull => {
+                        let d = self.particles.dimensions();
                         let own = &self.best_position[self.particles.row(particle)];
                         self.particles.one(particle).pull(
-                            (own, parent(&self.archive, &self.best_position, leader)),
+                            (own, parent(&self.archive, &self.best_position, d, leader)),
                             &self.settings.motion,
                             (share, self.counters.iteration),
                             self.random,
@@ -212,6 +239,18 @@ impl SmallSwarm {
             let (motion, now) = (&self.settings.motion, (share, self.counters.iteration));
             self.particles
                 .mutate(particle, motion.mutation, now, self.random, &mut self.trials);
+        }
+    }
+
+    /// Relaxes the constraints from the first violation on, and takes them back while iterations go by.
+    fn relax(&mut self, evaluation: &Evaluation) {
+        let (iteration, settings, archive) = (self.counters.iteration, &self.settings, &self.archive);
+        if !self.violated && evaluation.violations.iter().any(|violation| *violation > 0.0) {
+            self.violated = true;
+            self.relaxation = Relaxation::of(archive, settings, iteration).map(Box::new);
+        } else {
+            self.relaxation
+                .take_if(|relaxation| !relaxation.advance(archive, settings, iteration));
         }
     }
 
@@ -228,10 +267,9 @@ impl SmallSwarm {
 }
 
 /// The position of a parent: the archive's members come first, then the particles' own bests. There has to be a member.
-fn parent<'a>(archive: &'a Archive, own_bests: &'a [f64], parent: usize) -> &'a [f64] {
-    let dimensions = archive.positions[0].len();
+fn parent<'a>(archive: &'a Archive, own_bests: &'a [f64], dimensions: usize, parent: usize) -> &'a [f64] {
     match parent.checked_sub(archive.len()) {
-        None => &archive.positions[parent],
+        None => &archive.positions[parent][..dimensions],
         Some(particle) => &own_bests[particle * dimensions..(particle + 1) * dimensions],
     }
 }
@@ -267,16 +305,28 @@ impl Optimiser for SmallSwarm {
         let scattered = self.archive.is_empty() || self.counters.iteration == 0;
         let before = self.earnings.clone();
         self.earnings.fade();
+        self.relax(evaluation);
         for (particle, of) in rows.into_iter().enumerate() {
             let Some(row) = evaluation.success(of, self.objectives) else {
                 continue;
             };
             let range = self.particles.row(particle);
             let position = &self.particles.position[range.clone()];
-            let violation = evaluation.violation(of);
-            let mut members = self.archive.objectives.iter();
-            let takes = violation < self.archive.violation() || members.any(|member| dominates(row, member));
-            let entered = self.archive.insert_violating(position, row, violation);
+            let told = evaluation.violation(of);
+            let relaxed = self.is_relaxed(particle);
+            let relaxation = self.relaxation.as_mut().filter(|_| relaxed);
+            let counts = |violation| relaxation.as_ref().map_or(violation, |r| r.violation(violation));
+            let (violation, least) = (counts(told), counts(self.best_violation[particle]));
+            let followed = relaxation.as_ref().map_or(&self.archive, |r| &r.archive);
+            let mut members = followed.objectives.iter();
+            let takes = violation < followed.violation() || members.any(|member| dominates(row, member));
+            let mut entered = self.archive.insert_violating(position, row, told);
+            if let Some(relaxation) = &mut self.relaxation {
+                let entered_relaxed = relaxation.insert(position, row, told);
+                if relaxed {
+                    entered = entered_relaxed;
+                }
+            }
             if !scattered {
                 let earned = takes && entered;
                 let made = self.choice(&before, particle);
@@ -284,10 +334,9 @@ impl Optimiser for SmallSwarm {
             }
             let heads = self.coin(Purpose::Coin, particle) < 0.5;
             let best = &mut self.best_objectives[particle];
-            let least = self.best_violation[particle];
             let open = violation == least && !dominates(best, row) && heads;
             if violation < least || (violation == least && dominates(row, best)) || open {
-                self.best_violation[particle] = violation;
+                self.best_violation[particle] = told;
                 best.copy_from_slice(row);
                 self.best_position[range].copy_from_slice(position);
             }
