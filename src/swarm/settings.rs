@@ -266,7 +266,7 @@ pub struct MopsoSettings {
     /// The reference point of contributions, a value for each of up to five objectives. The archive's hypervolume up to this
     /// point then never falls. With `None` the archive chooses the point and keeps the ends of its front.
     pub reference: Option<Vec<f64>>,
-    /// Choice of leaders. They are own bests while nothing feasible is known: of two at random the one that violates less. Where
+    /// Choice of leaders. They are own bests while nothing counts as feasible: of two at random the one that violates less. Where
     /// members leave by contribution and no reference is given, the ends of the front win every tournament of a swarm of fewer
     /// than [`super::MANY`] particles.
     pub leaders: Leaders,

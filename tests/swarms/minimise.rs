@@ -334,16 +334,16 @@ fn constrained_volumes(variables: usize, least: f64, violation: impl Fn(f64) -> 
     volumes
 }
 
-/// Between the first candidates and the front, 0.876, lies a wide ring where nothing is feasible. A swarm that keeps to its constraints
-/// from the start finds nothing of the front with ten of these seeds.
+/// Between the first candidates and the front lies a wide ring where nothing is feasible. The front's hypervolume is 0.877. A swarm that
+/// keeps to its constraints from the start finds nothing of it with ten of these seeds.
 #[test]
 fn infeasible_land_is_crossed() {
     let volumes = constrained_volumes(20, 0.0, |distance| (distance - 0.02).min(1.2 - distance));
     assert!(volumes[0] > 0.871, "{volumes:?}");
 }
 
-/// All that is feasible is a thin shell, and the front runs along it. A swarm that keeps to its constraints from the start
-/// has a median of 0.634, and 0.797 at best.
+/// All that is feasible is a thin shell, and the front runs along it. A swarm that keeps to its constraints from the start ends at a median
+/// of 0.634, and at 0.797 at best.
 #[test]
 fn a_thin_shell_is_followed() {
     let volumes = constrained_volumes(10, 0.299, |distance| (distance - 0.3).abs() - 0.001);

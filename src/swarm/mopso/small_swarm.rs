@@ -190,20 +190,16 @@ impl SmallSwarm {
         }
     }
 
-    /// Whether a particle ignores the constraints as far as they are relaxed.
-    fn is_relaxed(&self, particle: usize) -> bool {
-        self.relaxation.is_some() && !Relaxation::leaves_out(particle)
-    }
-
+    /// Moves the particles: those that keep to the constraints by the archive, the others by that of the relaxed constraints.
     fn advance(&mut self) {
-        let relaxed: Vec<bool> = (0..self.particles.count).map(|p| self.is_relaxed(p)).collect();
-        self.advance_some(|particle| !relaxed[particle]);
-        if let Some(mut relaxation) = self.relaxation.take() {
-            std::mem::swap(&mut self.archive, &mut relaxation.archive);
-            self.advance_some(|particle| relaxed[particle]);
-            std::mem::swap(&mut self.archive, &mut relaxation.archive);
-            self.relaxation = Some(relaxation);
-        }
+        let Some(mut relaxation) = self.relaxation.take() else {
+            return self.advance_some(|_| true);
+        };
+        self.advance_some(Relaxation::leaves_out);
+        std::mem::swap(&mut self.archive, &mut relaxation.archive);
+        self.advance_some(|particle| !Relaxation::leaves_out(particle));
+        std::mem::swap(&mut self.archive, &mut relaxation.archive);
+        self.relaxation = Some(relaxation);
     }
 
     /// Moves these particles by the archive.
@@ -313,11 +309,11 @@ impl Optimiser for SmallSwarm {
             let range = self.particles.row(particle);
             let position = &self.particles.position[range.clone()];
             let told = evaluation.violation(of);
-            let relaxed = self.is_relaxed(particle);
-            let relaxation = self.relaxation.as_mut().filter(|_| relaxed);
-            let counts = |violation| relaxation.as_ref().map_or(violation, |r| r.violation(violation));
+            let relaxed = !Relaxation::leaves_out(particle);
+            let relaxation = self.relaxation.as_ref().filter(|_| relaxed);
+            let counts = |violation| relaxation.map_or(violation, |r| r.violation(violation));
             let (violation, least) = (counts(told), counts(self.best_violation[particle]));
-            let followed = relaxation.as_ref().map_or(&self.archive, |r| &r.archive);
+            let followed = relaxation.map_or(&self.archive, |r| &r.archive);
             let mut members = followed.objectives.iter();
             let takes = violation < followed.violation() || members.any(|member| dominates(row, member));
             let mut entered = self.archive.insert_violating(position, row, told);
