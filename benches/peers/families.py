@@ -3,8 +3,9 @@
     pip install ./python pymoo==0.6.2 moocore==0.3.2 coco-experiment==2.8.2
     python benches/peers/families.py --seeds 5 --families mw,g
 
-They are constrained problems of pymoo (`das5`, `das9` and `das13` are DAS-CMOP with another difficulty than `dascmop`), LIR-CMOP
-(`lircmop`), and COCO's `bbob-biobj` with ten variables (`biobj`): 55 pairs of ten functions.
+They are constrained problems of pymoo (`das5`, `das9` and `das13` are DAS-CMOP with another difficulty than `dascmop`); those of
+`problems.py` (`lircmop`, `cf`, `bt`, `glt`, `zcat`, and ZCAT of higher levels with two and three objectives, `zcat2` and `zcat3`); and
+COCO's `bbob-biobj` with ten variables (`biobj`): 55 pairs of ten functions.
 
 25,000 evaluations for several objectives, with populations and archives of 100; 100,000 for one. Settings are the defaults of
 both. Hypervolumes are moocore's, on the scale of the front of all that was found in this run, with the reference at 1.1. A run
@@ -27,69 +28,9 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from pymoo.problems import many, multi, single
 
+from problems import Lircmop, bt, cf, glt, zcat
+
 SEVERAL, ONE = 25_000, 100_000
-
-
-class Lircmop(Problem):
-    """LIR-CMOP1 to 14 (Fan et al., *An improved epsilon constraint-handling method in MOEA/D for CMOPs with large infeasible
-    regions*, Soft Computing 23, 2019)."""
-
-    LIMITS = (2, 2, 3, 3, 2, 2, 3, 3, 2, 2, 2, 2, 2, 3)
-    # Of the ellipses within which nothing is feasible: where they lie, and their axes.
-    ELLIPSES = {
-        5: ((1.6, 1.6, 2, 4), (2.5, 2.5, 2, 8)),
-        6: ((1.8, 1.8, 2, 8), (2.8, 2.8, 2, 8)),
-        7: ((1.2, 1.2, 2, 6), (2.25, 2.25, 2.5, 12), (3.5, 3.5, 2.5, 10)),
-        9: ((1.4, 1.4, 1.5, 6),),
-        10: ((1.1, 1.2, 2, 4),),
-        11: ((1.2, 1.2, 1.5, 5),),
-        12: ((1.6, 1.6, 1.5, 6),),
-    }
-    ELLIPSES[8] = ELLIPSES[7]
-    WAVES = {9: 2.0, 10: 1.0, 11: 2.1, 12: 2.5}
-
-    def __init__(self, number):
-        self.number, self.title = number, f"LIRCMOP{number}"
-        objectives = 3 if number >= 13 else 2
-        super().__init__(n_var=30, n_obj=objectives, n_ieq_constr=self.LIMITS[number - 1], xl=0.0, xu=1.0)
-
-    def _evaluate(self, x, out, *args, **kwargs):
-        f, limits = self.spheres(x) if self.number >= 13 else self.curves(x)
-        # They are wanted at zero and above.
-        out["F"], out["G"] = np.stack(f, axis=1), -np.stack(limits, axis=1)
-
-    def spheres(self, x):
-        radius = 1.7057 + 10 * ((x[:, 2:] - 0.5) ** 2).sum(axis=1)
-        a, b = x[:, 0] * np.pi / 2, x[:, 1] * np.pi / 2
-        f = [radius * np.cos(a) * np.cos(b), radius * np.cos(a) * np.sin(b), radius * np.sin(a)]
-        shells = ((3, 2), (1.9, 1.8), (1.75, 1.6))[: self.n_ieq_constr]
-        return f, [(radius**2 - one**2) * (radius**2 - other**2) for one, other in shells]
-
-    def curves(self, x):
-        number, first = self.number, x[:, 0]
-        j = np.arange(2, 31)
-        phase = 0.5 * np.pi * x[:, :1] * (1 if number <= 4 else j / 30)
-        odd = ((x[:, 1:] - np.sin(phase)) ** 2)[:, j % 2 == 1].sum(axis=1)
-        even = ((x[:, 1:] - np.cos(phase)) ** 2)[:, j % 2 == 0].sum(axis=1)
-        other = 1 - np.sqrt(first) if number in (2, 4, 5, 7, 10, 11) else 1 - first**2
-        if number <= 4:
-            limits = [(0.51 - odd) * (odd - 0.5), (0.51 - even) * (even - 0.5), np.sin(20 * np.pi * first) - 0.5]
-            return [first + odd, other + even], limits[: self.n_ieq_constr]
-        if number <= 8:
-            f = [first + 10 * odd + 0.7057, other + 10 * even + 0.7057]
-        else:
-            f = [1.7057 * first * (10 * odd + 1), 1.7057 * other * (10 * even + 1)]
-        limits = [self.outside(f, *ellipse) for ellipse in self.ELLIPSES[number]]
-        if number in self.WAVES:
-            along, across = (f[0] + f[1]) * np.sqrt(0.5), (f[0] - f[1]) * np.sqrt(0.5)
-            limits.append(along - np.sin(4 * np.pi * across) - self.WAVES[number])
-        return f, limits
-
-    @staticmethod
-    def outside(f, p, q, a, b):
-        """Of an ellipse with its first axis along the diagonal."""
-        u, v = (f[0] - p + f[1] - q) * np.sqrt(0.5), (f[1] - q - f[0] + p) * np.sqrt(0.5)
-        return (u / a) ** 2 + (v / b) ** 2 - 0.1
 
 
 class Coco(Problem):
@@ -120,6 +61,13 @@ FAMILIES = {
     "dascmop": lambda: [dascmop(i, 3) for i in range(1, 10)],
     **{f"das{d}": lambda d=d: [dascmop(i, d) for i in range(1, 10)] for d in (5, 9, 13)},
     "lircmop": lambda: [Lircmop(i) for i in range(1, 15)],
+    "cf": lambda: [cf(i) for i in range(1, 11)],
+    "bt": lambda: [bt(i) for i in range(1, 10)],
+    "glt": lambda: [glt(i) for i in range(1, 7)],
+    "zcat": lambda: [zcat(i, 1) for i in range(1, 21)],
+    # All levels in turn.
+    "zcat2": lambda: [zcat(i, 1 + i % 6) for i in range(1, 21)],
+    "zcat3": lambda: [zcat(i, 1 + (i + 2) % 6, 3) for i in range(1, 21)],
     "dcdtlz": lambda: [getattr(many, f"DC{i}DTLZ{j}")() for i in (1, 2, 3) for j in (1, 3)],
     "g": lambda: [getattr(single, f"G{i}")() for i in (*range(1, 12), *range(13, 20), 21, 23, 24)],
     "biobj": lambda: coco(1),

@@ -14,6 +14,7 @@ tests! {
     pages_work_in_a_browser: browser,
     runs_are_laid_side_by_side: everywhere,
     what_is_measured_has_a_page: also_browser,
+    parity_has_a_page: full also_browser,
     folders_that_are_no_runs_are_refused_by_name: everywhere,
 }
 
@@ -349,7 +350,7 @@ fn what_is_measured_has_a_page() {
         "line",
     ];
     // Words of the page, its charts, and a file beside it.
-    let runs: [(&str, Vec<&str>, &str, u64, &str); 7] = [
+    let runs: [(&str, Vec<&str>, &str, u64, &str); 6] = [
         (
             "sweep",
             vec!["sweep", &sweep],
@@ -425,13 +426,6 @@ fn what_is_measured_has_a_page() {
             "quality.svg",
         ),
         (
-            "parity",
-            vec!["parity", "--backend", "simd"],
-            "comparisons agree with the reference",
-            1,
-            "kernels.csv",
-        ),
-        (
             "simulate",
             vec!["simulate", "--track", "stadium:300:80:12"],
             "1 run of simulate, by logged lap",
@@ -439,28 +433,8 @@ fn what_is_measured_has_a_page() {
             "lap.csv",
         ),
     ];
-    let browser = browser();
-    for (name, mut arguments, words, charts, beside) in runs {
-        let out = path(name);
-        arguments.extend(["--out", &out]);
-        let run = lapswarm(&arguments);
-        assert!(
-            run.status.success(),
-            "{name}: {}",
-            String::from_utf8_lossy(&run.stderr)
-        );
-        let page = folder.path().join(name).join("report.html");
-        let html = std::fs::read_to_string(&page).unwrap();
-        assert!(html.contains(words), "{name} does not say: {words}");
-        assert!(
-            folder.path().join(name).join(beside).is_file(),
-            "{name}: {beside}"
-        );
-        if let Some(browser) = &browser {
-            sound(&used(browser, &page), charts);
-        }
-        // Nothing is overwritten.
-        assert_eq!(lapswarm(&arguments).status.code(), Some(2), "{name} again");
+    for (name, arguments, words, charts, beside) in runs {
+        has_a_page(&folder.path().join(name), &arguments, words, charts, beside);
     }
     // The rates are those of the JSON: two rows of the line.
     let rows = std::fs::read_to_string(folder.path().join("bench/rows.csv")).unwrap();
@@ -491,6 +465,33 @@ fn what_is_measured_has_a_page() {
         html.contains("lap.csv: logged") && html.contains("simulate: logged"),
         "{out}"
     );
+}
+
+fn parity_has_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "comparisons agree with the reference";
+    let parity = ["parity", "--backend", "simd"];
+    has_a_page(&folder.path().join("parity"), &parity, words, 1, "kernels.csv");
+}
+
+/// What these arguments measure is in the folder `out`: a page with these words and so many charts, and a file beside it.
+fn has_a_page(out: &Path, arguments: &[&str], words: &str, charts: u64, beside: &str) {
+    let arguments = [arguments, &["--out", out.to_str().unwrap()]].concat();
+    let run = lapswarm(&arguments);
+    assert!(
+        run.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    let page = out.join("report.html");
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(html.contains(words), "{arguments:?} does not say: {words}");
+    assert!(out.join(beside).is_file(), "{arguments:?}: {beside}");
+    if let Some(browser) = browser() {
+        sound(&used(&browser, &page), charts);
+    }
+    // Nothing is overwritten.
+    assert_eq!(lapswarm(&arguments).status.code(), Some(2), "{arguments:?} again");
 }
 
 fn folders_that_are_no_runs_are_refused_by_name() {

@@ -95,6 +95,7 @@ fn polish_recovers_the_truth_from_a_distance() {
 
 /// The polish follows a bent valley from afar: one corner tells all 22 parameters after a small swarm.
 #[test]
+#[ignore = "full tier: whole identifications"]
 fn one_corner_is_enough_for_a_small_swarm() {
     for seed in [1, 2] {
         let settings = IdentifySettings {
