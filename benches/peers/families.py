@@ -4,8 +4,8 @@
     python benches/peers/families.py --seeds 5 --families mw,g
 
 They are constrained problems of pymoo (`das5`, `das9` and `das13` are DAS-CMOP with another difficulty than `dascmop`); those of
-`problems.py` (`lircmop`, `cf`, `bt`, `glt`, `zcat`, and ZCAT of higher levels with two and three objectives, `zcat2` and `zcat3`); and
-COCO's `bbob-biobj` with ten variables (`biobj`): 55 pairs of ten functions.
+`problems.py` (`lircmop`, `cf`, `bt`, `glt`, and `zcat`; `zcat2` and `zcat3` are ZCAT of all levels in turn with two and three objectives);
+and COCO's `bbob-biobj` with ten variables (`biobj`): 55 pairs of ten functions.
 
 25,000 evaluations for several objectives, with populations and archives of 100; 100,000 for one. Settings are the defaults of
 both. Hypervolumes are moocore's, on the scale of the front of all that was found in this run, with the reference at 1.1. A run

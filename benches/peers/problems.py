@@ -212,7 +212,7 @@ def zcat(number, level, objectives=2):
 
 def bt(number):
     """BT1 to 9 (Li, Zhang, Deng, *Biased multiobjective optimization and decomposition algorithm*, IEEE Transactions on Cybernetics 47,
-    2017)."""
+    2017), thirty variables, as PlatEMO has them."""
     j = np.arange(1, 31)
     scale = {1: 1e-10, 3: 1e-8, 4: 1e-8, 5: 1e-10, 6: 1e-4, 7: 1e-3, 8: 1e-3, 9: 1e-9}.get(number)
 
@@ -238,13 +238,13 @@ def bt(number):
             d = 4 * d**2 - cos(8 * pi * d) + 1
         a = x[:, 0]
         if number == 9:
-            b, sums = x[:, 1], [10 * d[:, (j > 2) & (j % 3 == r)].sum(axis=1) for r in (0, 1, 2)]
+            b, sums = x[:, 1], [d[:, (j > 2) & (j % 3 == r)].sum(axis=1) for r in (0, 1, 2)]
             f = [cos(a * pi / 2) * cos(b * pi / 2), cos(a * pi / 2) * sin(b * pi / 2), sin(a * pi / 2)]
             return [f + s for f, s in zip(f, sums)], []
-        odd, even = (d[:, (j > 1) & (j % 2 == r)].sum(axis=1) for r in (1, 0))
+        even, odd = (d[:, (j > 1) & (j % 2 == r)].sum(axis=1) for r in (0, 1))
         a = a**0.02 if number == 3 else spread(a, 0.06) if number == 4 else a
         other = (1 - a) * (1 - a * sin(8.5 * pi * a)) if number == 5 else 1 - np.sqrt(a)
-        return [a + odd, other + even], []
+        return [a + even, other + odd], []
 
     return Formula(f"BT{number}", function, *box(30, -1 if number == 7 else 0, 1), 3 if number == 9 else 2)
 
@@ -320,7 +320,8 @@ def cf(number):
 
 def glt(number):
     """GLT1 to 6 (Gu, Liu, Tan, *A multiobjective evolutionary algorithm using dynamic weight design method*, International Journal of
-    Innovative Computing, Information and Control 8, 2012), ten variables."""
+    Innovative Computing, Information and Control 8, 2012), ten variables, as jMetal has them but for two things: phases count from one,
+    and GLT3's kink is where the first objective is 0.05."""
     i = np.arange(1, 11)
     along = 2 if number >= 5 else 1
 
@@ -343,7 +344,7 @@ def glt(number):
     return Formula(f"GLT{number}", function, *box(10, -1, 1, along), 3 if number >= 5 else 2)
 
 
-class Lircmop(Problem):
+class Lircmop(Formula):
     """LIR-CMOP1 to 14 (Fan et al., *An improved epsilon constraint-handling method in MOEA/D for CMOPs with large infeasible
     regions*, Soft Computing 23, 2019)."""
 
@@ -362,21 +363,16 @@ class Lircmop(Problem):
     WAVES = {9: 2.0, 10: 1.0, 11: 2.1, 12: 2.5}
 
     def __init__(self, number):
-        self.number, self.title = number, f"LIRCMOP{number}"
-        objectives = 3 if number >= 13 else 2
-        super().__init__(n_var=30, n_obj=objectives, n_ieq_constr=self.LIMITS[number - 1], xl=0.0, xu=1.0)
-
-    def _evaluate(self, x, out, *args, **kwargs):
-        f, limits = self.spheres(x) if self.number >= 13 else self.curves(x)
-        # They are wanted at zero and above.
-        out["F"], out["G"] = np.stack(f, axis=1), -np.stack(limits, axis=1)
+        self.number, self.limits = number, self.LIMITS[number - 1]
+        function = self.spheres if number >= 13 else self.curves
+        super().__init__(f"LIRCMOP{number}", function, *box(30, 0, 1), 3 if number >= 13 else 2, self.limits)
 
     def spheres(self, x):
         radius = 1.7057 + 10 * ((x[:, 2:] - 0.5) ** 2).sum(axis=1)
         a, b = x[:, 0] * np.pi / 2, x[:, 1] * np.pi / 2
         f = [radius * np.cos(a) * np.cos(b), radius * np.cos(a) * np.sin(b), radius * np.sin(a)]
-        shells = ((3, 2), (1.9, 1.8), (1.75, 1.6))[: self.n_ieq_constr]
-        return f, [(radius**2 - one**2) * (radius**2 - other**2) for one, other in shells]
+        shells = ((3, 2), (1.9, 1.8), (1.75, 1.6))[: self.limits]
+        return f, [-(radius**2 - one**2) * (radius**2 - other**2) for one, other in shells]
 
     def curves(self, x):
         number, first = self.number, x[:, 0]
@@ -386,20 +382,20 @@ class Lircmop(Problem):
         even = ((x[:, 1:] - np.cos(phase)) ** 2)[:, j % 2 == 0].sum(axis=1)
         other = 1 - np.sqrt(first) if number in (2, 4, 5, 7, 10, 11) else 1 - first**2
         if number <= 4:
-            limits = [(0.51 - odd) * (odd - 0.5), (0.51 - even) * (even - 0.5), np.sin(20 * np.pi * first) - 0.5]
-            return [first + odd, other + even], limits[: self.n_ieq_constr]
+            limits = [-(0.51 - odd) * (odd - 0.5), -(0.51 - even) * (even - 0.5), 0.5 - np.sin(20 * np.pi * first)]
+            return [first + odd, other + even], limits[: self.limits]
         if number <= 8:
             f = [first + 10 * odd + 0.7057, other + 10 * even + 0.7057]
         else:
             f = [1.7057 * first * (10 * odd + 1), 1.7057 * other * (10 * even + 1)]
-        limits = [self.outside(f, *ellipse) for ellipse in self.ELLIPSES[number]]
+        limits = [self.within(f, *ellipse) for ellipse in self.ELLIPSES[number]]
         if number in self.WAVES:
             along, across = (f[0] + f[1]) * np.sqrt(0.5), (f[0] - f[1]) * np.sqrt(0.5)
-            limits.append(along - np.sin(4 * np.pi * across) - self.WAVES[number])
+            limits.append(-(along - np.sin(4 * np.pi * across) - self.WAVES[number]))
         return f, limits
 
     @staticmethod
-    def outside(f, p, q, a, b):
+    def within(f, p, q, a, b):
         """Of an ellipse with its first axis along the diagonal."""
         u, v = (f[0] - p + f[1] - q) * np.sqrt(0.5), (f[1] - q - f[0] + p) * np.sqrt(0.5)
-        return (u / a) ** 2 + (v / b) ** 2 - 0.1
+        return -((u / a) ** 2 + (v / b) ** 2 - 0.1)
