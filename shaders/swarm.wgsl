@@ -10,6 +10,8 @@ struct Generation {
     dimensions: u32,
     objectives: u32,
     members: u32,
+    // Members that pushed particles follow, behind the others; none where they follow the same.
+    pushed_members: u32,
     signed: u32,
     per_dimension: u32,
     tournament: u32,
@@ -17,6 +19,8 @@ struct Generation {
     constrained: u32,
     // By how much the members of the archive do.
     violation: f32,
+    // The violation that counts as none for pushed particles, and for an archive that they follow.
+    allowance: f32,
     inertia: f32,
     cognitive: f32,
     social: f32,
@@ -34,7 +38,9 @@ const BLOCK: u32 = 64u;
 const UNKNOWN: f32 = 3.4028234e38;
 // Objectives of this size and more say in their last eight bits why a particle failed; this many reasons are told apart.
 const FAILED: u32 = 0x7f7fff00u;
-const REASONS: u32 = 14u;
+const REASONS: u32 = 13u;
+// One particle of so many keeps to the constraints; the others are pushed.
+const KEEPING: u32 = 2u;
 const SCALE: f32 = 0.5;
 const CROSSOVER: f32 = 0.3;
 const ALL_COORDINATES: f32 = 0.3;
@@ -61,11 +67,12 @@ const RECOMBINE: u32 = 9u;
 @group(0) @binding(4) var<storage, read_write> best_position: array<f32>;
 @group(0) @binding(5) var<storage, read_write> best_objectives: array<f32>;
 @group(0) @binding(6) var<storage, read_write> objectives: array<f32>;
-// How many points may enter the archive, the bits of the least violation of a particle, and how many failed for each reason; then those
-// points: the particle and its objectives, three to each.
+// How many points may enter the archive, the bits of the least and the greatest violation of a particle, and how many failed for each
+// reason; then those points: the particle and its objectives, three to each.
 struct Found {
     count: atomic<u32>,
     least: atomic<u32>,
+    most: atomic<u32>,
     failed: array<atomic<u32>, REASONS>,
     points: array<vec4<u32>>,
 }
@@ -83,6 +90,22 @@ fn place(who: u32, width: u32, k: u32) -> u32 {
 // Rows of objectives.
 fn rows() -> u32 {
     return generation.objectives + generation.constrained;
+}
+
+fn is_pushed(who: u32) -> bool {
+    return who % KEEPING != 0u;
+}
+
+// The bits of the violation that counts where one of this allowance counts as none.
+fn counted(violation: f32, allowance: f32) -> u32 {
+    let size = size_of(max(violation, 0.0));
+    return select(size, 0u, size <= size_of(allowance));
+}
+
+// Where the leaders of a particle begin, and how many there are.
+fn led_by(who: u32) -> vec2<u32> {
+    if is_pushed(who) && generation.pushed_members > 0u { return vec2<u32>(generation.members, generation.pushed_members); }
+    return vec2<u32>(0u, generation.members);
 }
 
 fn held(x: f32) -> f32 {
@@ -126,6 +149,7 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
     var less = false;
     var more = false;
     var violation = 0.0;
+    let allowance = select(0.0, generation.allowance, is_pushed(who));
     var sound = true;
     var reason = 0u;
     for (var k = 0u; k < width; k++) {
@@ -137,8 +161,10 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
             no_better = no_better && best <= value;
         } else {
             violation = max(value, 0.0);
-            less = violation < max(best, 0.0);
-            more = violation > max(best, 0.0);
+            let counts = counted(value, allowance);
+            let known = counted(best, allowance);
+            less = counts < known;
+            more = counts > known;
         }
         let size = size_of(value);
         if size >= FAILED {
@@ -151,7 +177,10 @@ fn learn(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
         atomicAdd(&found.failed[reason], 1u);
         return;
     }
-    if generation.constrained == 1u { atomicMin(&found.least, size_of(violation)); }
+    if generation.constrained == 1u {
+        atomicMin(&found.least, size_of(violation));
+        atomicMax(&found.most, size_of(violation));
+    }
     let heads = words(COIN, who, 0u).x < 0x80000000u;
     let better = no_worse && !no_better;
     let open = no_worse == no_better;
@@ -207,9 +236,10 @@ fn may_enter(who: u32) -> vec3<f32> {
     }
     if generation.constrained == 1u {
         let value = objectives[place(who, rows(), generation.objectives)];
-        let least = atomicLoad(&found.least);
+        let least = counted(bitcast<f32>(atomicLoad(&found.least)), generation.allowance);
         let known = size_of(generation.violation);
-        if size_of(value) >= FAILED || size_of(max(value, 0.0)) > min(least, known) { return vec3<f32>(UNKNOWN); }
+        let counts = counted(value, generation.allowance);
+        if size_of(value) >= FAILED || counts > min(least, known) { return vec3<f32>(UNKNOWN); }
         // The members leave.
         if least < known { return at; }
     }
@@ -267,8 +297,10 @@ fn advance(
 
 fn turn_of(who: u32) -> vec3<u32> {
     let choice = words(RECOMBINE, who, 0u);
-    var leader = below(choice.y, generation.members);
-    if generation.tournament == 1u { leader = min(leader, below(choice.z, generation.members)); }
+    let leaders = led_by(who);
+    var leader = below(choice.y, leaders.y);
+    if generation.tournament == 1u { leader = min(leader, below(choice.z, leaders.y)); }
+    leader += leaders.x;
     let coin = unit(choice.x);
     let disturbed = unit(choice.w) < generation.mutation_share;
     var what = select(IS_PULLED, IS_PULLED_AND_DISTURBED, disturbed);
@@ -329,8 +361,9 @@ fn pull_coordinate(i: u32, towards: f32, shares: Pulls) {
 fn differ_one(who: u32, leader: u32, slice: vec2<u32>) {
     let d = generation.dimensions;
     let picks = words(DIFFERENCE, who, 0u);
-    let one = below(picks.x, generation.members);
-    let two = below(picks.y, generation.members);
+    let leaders = led_by(who);
+    let one = leaders.x + below(picks.x, leaders.y);
+    let two = leaders.x + below(picks.y, leaders.y);
     let always = below(picks.z, d);
     let whole = unit(picks.w) < ALL_COORDINATES;
     for (var four = slice.x / 4u; 4u * four < slice.y; four++) {
@@ -364,7 +397,8 @@ fn disturb_one(who: u32, slice: vec2<u32>) {
 // To a place between or about two archive members, each coordinate by itself, disturbed by mutation.
 fn cross_one(who: u32, leader: u32, slice: vec2<u32>) {
     let d = generation.dimensions;
-    let other = below(words(RECOMBINE, who, 1u).x, generation.members);
+    let leaders = led_by(who);
+    let other = leaders.x + below(words(RECOMBINE, who, 1u).x, leaders.y);
     for (var k = slice.x; k < slice.y; k++) {
         let draws = words(RECOMBINE, who, 2u + k);
         var x = cross_coordinates(archive[leader * d + k], archive[other * d + k], draws.x, unit(draws.y));

@@ -9,7 +9,8 @@ struct Gathering {
 struct Found {
     count: u32,
     least: u32,
-    failed: array<u32, 14>,
+    most: u32,
+    failed: array<u32, 13>,
     points: array<vec4<u32>>,
 }
 

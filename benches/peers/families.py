@@ -74,6 +74,8 @@ FAMILIES = {
 }
 # The members that NSGA-II and SMS-EMOA have.
 MEMBERS = 100
+# Population and evaluations of lapswarm where they are not its own.
+SIZE = {}
 
 
 def ours(problem, seed):
@@ -90,6 +92,7 @@ def ours(problem, seed):
         inequalities=inequalities,
         equalities=equalities,
         seed=seed,
+        **SIZE,
     )
     return found.F if found.violation == 0 else None
 
@@ -141,7 +144,11 @@ def main():
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--families", default=",".join(FAMILIES))
     parser.add_argument("--programs", default="", help="only these, by name")
+    parser.add_argument("--population", type=int, help="of lapswarm")
+    parser.add_argument("--evaluations", type=int, help="of lapswarm")
     arguments = parser.parse_args()
+    given = {"population": arguments.population, "evaluations": arguments.evaluations}
+    SIZE.update({name: value for name, value in given.items() if value is not None})
     warnings.filterwarnings("ignore")
     for family in arguments.families.split(","):
         for problem in FAMILIES[family]():

@@ -1,6 +1,6 @@
 //! Measurements that are kept in a folder, with a page.
 
-use super::output::outln;
+use super::output::{outln, set_silent};
 use super::print_json;
 use lapswarm::Result;
 use lapswarm::evaluate::BackendChoice;
@@ -11,20 +11,26 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The flag of the folder that a measurement is kept in.
+/// The flags of what becomes of a measurement.
 #[derive(clap::Args)]
-pub struct FolderFlag {
+pub struct MeasurementFlags {
     /// Keep the figures in this folder, with pictures and report.html; refused if it holds anything
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object on stdout; words go to stderr
     #[arg(long)]
-    pub json: bool,
+    json: bool,
+    /// No words and no table
+    #[arg(long)]
+    quiet: bool,
 }
 
-impl FolderFlag {
+impl MeasurementFlags {
     /// The folder is refused before anything is measured; `adapter` is what the flag `--adapter` says.
     pub fn begin<'a>(&self, study: &'static str, adapter: Option<&'a str>) -> Result<Keeping<'a>> {
+        if self.quiet {
+            set_silent();
+        }
         let create = |path| run_folder::create(study, Some(path));
         Ok(Keeping {
             study,
@@ -44,20 +50,17 @@ pub struct Keeping<'a> {
 }
 
 impl Keeping<'_> {
-    /// Keeps what was measured, if a folder is asked for, and prints it as JSON, if that is; `told` says whether words go to the
-    /// terminal. The folder gets `summary.json`, `manifest.json` and `report.html`, whose page ends with what measured.
+    /// Keeps what was measured, if a folder is asked for, and prints it as JSON, if that is. The folder gets `summary.json`,
+    /// `manifest.json` and `report.html`, whose page ends with what measured.
     pub fn finish<'b>(
         self,
-        told: bool,
         summary: &impl Serialize,
         backends: impl IntoIterator<Item = &'b str>,
         page: impl FnOnce(&Path) -> Result<HtmlReport>,
     ) -> Result<()> {
         if let Some(folder) = &self.folder {
             self.write(folder, summary, &distinct(backends), page(folder)?)?;
-            if told {
-                outln!("Results: {}", folder.display());
-            }
+            outln!("Results: {}", folder.display());
         }
         if self.json {
             print_json(summary)?;

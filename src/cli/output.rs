@@ -17,16 +17,26 @@ fn note(outcome: io::Result<()>) {
     }
 }
 
-/// Whether words go to standard error.
+/// Whether words go to standard error,
 static ASIDE: AtomicBool = AtomicBool::new(false);
+/// and whether there are none.
+static SILENT: AtomicBool = AtomicBool::new(false);
 
 /// From now on words and tables go to standard error: standard output is for the JSON object alone.
 pub fn set_words_aside() {
     ASIDE.store(true, Ordering::Relaxed);
 }
 
+/// From now on words and tables go nowhere.
+pub fn set_silent() {
+    SILENT.store(true, Ordering::Relaxed);
+}
+
 /// Writes words or a table.
 pub fn words(text: Arguments<'_>) {
+    if SILENT.load(Ordering::Relaxed) {
+        return;
+    }
     if ASIDE.load(Ordering::Relaxed) {
         to_stderr(text);
     } else {

@@ -1,7 +1,7 @@
 //! `lapswarm parity`.
 
 use super::backend_flag;
-use super::measurement::FolderFlag;
+use super::measurement::MeasurementFlags;
 use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::BackendChoice;
 use lapswarm::evaluate::gpu::{DeviceSummary, devices};
@@ -30,10 +30,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
     #[command(flatten)]
-    kept: FolderFlag,
-    /// No table
-    #[arg(long)]
-    quiet: bool,
+    kept: MeasurementFlags,
 }
 
 #[derive(Serialize)]
@@ -92,21 +89,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Subject::Device(context) => Some(context.summary()),
         Subject::Lanes(_) => None,
     });
-    if !arguments.quiet {
-        if device.is_none() && arguments.backend == BackendChoice::Auto && devices().is_empty() {
-            outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
-        }
-        outln!("{}  bits as f32", line_of(COLUMNS, None));
+    if device.is_none() && arguments.backend == BackendChoice::Auto && devices().is_empty() {
+        outln!("no GPU: neither Vulkan, Metal nor DX12 found an adapter");
     }
+    outln!("{}  bits as f32", line_of(COLUMNS, None));
     let found = compare(&subjects, |a| {
-        if !arguments.quiet {
-            let fails = if a.pass {
-                String::new()
-            } else {
-                format!("  FAILS: {}", a.worst)
-            };
-            outln!("{}  {}{fails}", line_of(COLUMNS, Some(a)), bits(a));
-        }
+        let fails = if a.pass {
+            String::new()
+        } else {
+            format!("  FAILS: {}", a.worst)
+        };
+        outln!("{}  {}{fails}", line_of(COLUMNS, Some(a)), bits(a));
     })?;
     let pass = found.iter().all(|a| a.pass);
     let evaluations = found.iter().map(|a| a.figures).sum();
@@ -131,24 +124,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .map_err(|e| Error::io(path, "write", std::io::Error::other(e)))?;
         write_whole(path, text.as_bytes())?;
     }
-    if !arguments.quiet {
-        if let Some(device) = device {
-            outln!("{device}");
-        }
-        let verdict = if pass {
-            "all agree with the f64 reference"
-        } else {
-            "NOT ALL AGREE"
-        };
-        outln!("{verdict}");
+    if let Some(device) = device {
+        outln!("{device}");
     }
+    let verdict = if pass {
+        "all agree with the f64 reference"
+    } else {
+        "NOT ALL AGREE"
+    };
+    outln!("{verdict}");
     let names = subjects.iter().map(|s| match s {
         Subject::Device(_) => "gpu",
         Subject::Lanes(_) => "simd",
     });
-    keeping.finish(!arguments.quiet, &report, names, |folder| {
-        page_of(folder, &report)
-    })?;
+    keeping.finish(&report, names, |folder| page_of(folder, &report))?;
     if pass {
         return Ok(());
     }

@@ -512,34 +512,42 @@ fn aligned(line: &str, comment: &str) -> String {
 /// Declares a struct of settings: its fields with unit, default, kind and meaning.
 ///
 /// A field reads `name: Type [unit] = default, kind, meaning;`, with `as "table.key"` after the type where its key in files is
-/// another one. Kinds are in [`crate::config::kinds`].
+/// another one. Kinds are in [`crate::config::kinds`]. A setting that several studies have reads `name: Type = shared_name;`, and is
+/// declared by [`shared_settings`].
 macro_rules! settings {
     (
         $(#[$doc:meta])*
         pub struct $name:ident {
-            $($field:ident: $ty:ty $(as $key:literal)? [$unit:literal] = $default:expr, $kind:expr, $meaning:literal;)*
+            $(
+                $field:ident: $ty:ty $(as $key:literal)?
+                $([$unit:literal] = $default:expr, $kind:expr, $meaning:literal)?
+                $(= $shared:ident)?;
+            )*
         }
         $($rest:tt)*
     ) => {
         $(#[$doc])*
         #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         pub struct $name {
-            $(#[doc = concat!($meaning, " (", $unit, ").")] pub $field: $ty,)*
+            $(
+                #[doc = concat!($($meaning)? $($shared!(meaning))?, " (", $($unit)? $($shared!(unit))?, ").")]
+                pub $field: $ty,
+            )*
         }
 
         impl Default for $name {
             fn default() -> Self {
-                Self { $($field: $default,)* }
+                Self { $($field: $($default)? $($shared!(default))?,)* }
             }
         }
 
         impl $crate::config::settings::Settings for $name {
             fn settings() -> Vec<$crate::config::settings::Setting<Self>> {
                 let mut all = Vec::new();
-                $(all.extend($kind.declare(
+                $(all.extend(($($kind)? $($shared!(kind))?).declare(
                     $crate::config::settings::key_of(&[stringify!($field) $(, $key)?]),
-                    $unit,
-                    $meaning,
+                    $($unit)? $($shared!(unit))?,
+                    $($meaning)? $($shared!(meaning))?,
                     &$crate::config::settings::Lens::new(|s: &Self| &s.$field, |s: &mut Self| &mut s.$field),
                 ));)*
                 all.extend(Self::linked());
@@ -551,6 +559,30 @@ macro_rules! settings {
     };
 }
 pub(crate) use settings;
+
+/// Declares settings that several studies have, for [`settings`]: `name [unit] = default, kind, meaning;`.
+macro_rules! shared_settings {
+    ($($name:ident [$unit:literal] = $default:expr, $kind:expr, $meaning:literal;)*) => {
+        $(
+            macro_rules! $name {
+                (unit) => {
+                    $unit
+                };
+                (default) => {
+                    $default
+                };
+                (kind) => {
+                    $kind
+                };
+                (meaning) => {
+                    $meaning
+                };
+            }
+            pub(crate) use $name;
+        )*
+    };
+}
+pub(crate) use shared_settings;
 
 /// The last of a field's names.
 pub(crate) const fn key_of(names: &[&'static str]) -> &'static str {

@@ -19,7 +19,7 @@ use std::path::Path;
 
 /// The format that this version writes, and the only one that it reads. It changes with the fields of any state, and with what an
 /// optimiser asks after the same answers: a run that resumes replays some of them.
-pub const VERSION: u32 = 20;
+pub const VERSION: u32 = 21;
 
 const MAGIC: &[u8; 8] = b"LAPSWARM";
 /// Bytes of that and the version.

@@ -11,7 +11,8 @@ use super::archive::Archive;
 use super::mopso::blocks::{Generation, UNKNOWN};
 use super::mopso::earnings::Earnings;
 use super::mopso::filter::{Point, front};
-use super::mopso::large_swarm::{empty_archive, leaders, take_in};
+use super::mopso::large_swarm::{Newcomers, empty_archive, leaders, measure, take_in};
+use super::mopso::relaxation::{Pushing, counted};
 use super::mopso::stand_ins::StandIns;
 use super::mopso::thinning::{PER_PLACE, thinned};
 use super::settings::MopsoSettings;
@@ -32,14 +33,25 @@ use buffers::{Buffers, Kernels, on_device};
 use state::last_row;
 
 /// Failures that are told apart.
-const REASONS: usize = 14;
+const REASONS: usize = 13;
 /// Particles that may enter an archive which are read back unasked, with their positions.
 const AT_ONCE: usize = 512;
 /// Of more particles that may enter an archive than this, a card leaves out those that the first of them dominate before they are read.
 const TOO_MANY: usize = 8192;
-/// Bytes before the points of the list of those found: their number, the least violation, and the failures by reason.
-const HEADER: u64 = 4 * (2 + REASONS as u64);
+/// Bytes before the points of the list of those found: their number, the least and the greatest violation, and the failures by reason.
+const HEADER: u64 = 4 * (3 + REASONS as u64);
 const _: () = assert!(Failure::WORDS.len() <= REASONS && HEADER.is_multiple_of(16));
+
+/// The greatest number of single precision that is not above, and that a particle which has not failed can violate constraints by.
+fn below(allowance: f64) -> f32 {
+    let rounded = allowance as f32;
+    let below = if f64::from(rounded) > allowance {
+        rounded.next_down()
+    } else {
+        rounded
+    };
+    below.min(UNKNOWN.next_down())
+}
 
 /// The points of a list of those found, as far as it goes.
 fn points_of(list: &[u32], count: usize) -> Vec<Point> {
@@ -59,26 +71,24 @@ fn row_major(blocks: &[f32], n: usize, width: usize) -> Vec<f64> {
     (0..n * width).map(|j| at(j / width, j % width)).collect()
 }
 
-/// The particles that may enter the archive.
+/// What the kernels say of the swarm.
 struct Noted {
+    /// The particles that may enter the archive.
     count: usize,
     /// The first of them, [`AT_ONCE`] at the most.
     points: Vec<Point>,
     /// Their positions.
     rows: Vec<f32>,
-    /// The least violation of a particle, or of the archive if that is less.
-    violation: f64,
-    /// Particles that have failed, by reason, if bests have learnt along with it.
-    failures: FailureCounts,
+    /// What bests have learnt along with it; nothing if they have not.
+    learnt: Learnt,
 }
 
-/// Those that may enter the archive, none of which another dominates.
-struct Newcomers {
-    points: Vec<Point>,
-    /// Their positions.
-    rows: Vec<f32>,
-    /// By how much all of them violate the constraints.
-    violation: f64,
+/// What is known of a population once bests have learnt.
+#[derive(Default)]
+struct Learnt {
+    /// The least and the greatest violation of a particle that has not failed.
+    violations: [f64; 2],
+    /// Particles that have failed, by reason.
     failures: FailureCounts,
 }
 
@@ -94,6 +104,7 @@ pub struct DeviceMopso {
     kernels: Kernels,
     buffers: Buffers,
     archive: Archive,
+    pushing: Pushing,
     earnings: Earnings,
     counters: Counters,
 }
@@ -149,7 +160,8 @@ impl DeviceMopso {
         }
         let archive = empty_archive(problem, &settings)?;
         let (swarm, scatter) = Self::unborn(settings, space, archive, (width, constrained), context)?;
-        swarm.dispatch(&scatter, 0)?;
+        swarm.announce(swarm.generation(0));
+        swarm.context.run(|encoder| swarm.record(encoder, &scatter))?;
         Ok(swarm)
     }
 
@@ -164,6 +176,7 @@ impl DeviceMopso {
         let (kernels, buffers, scatter) = on_device(&settings, &space, (objectives, constrained), &context)?;
         let swarm = Self {
             archive,
+            pushing: Pushing::default(),
             earnings: Earnings::default(),
             objectives,
             constrained,
@@ -219,6 +232,7 @@ impl DeviceMopso {
             objectives: self.objectives,
             constrained: self.constrained,
             archive: self.archive.clone(),
+            pushing: self.pushing.clone(),
             earnings: self.earnings.clone(),
             counters: self.counters,
         })
@@ -246,6 +260,7 @@ impl DeviceMopso {
             swarm.context.write(buffer, bytemuck::cast_slice(rows));
         }
         Ok(Self {
+            pushing: state.pushing,
             earnings: state.earnings,
             counters: state.counters,
             ..swarm
@@ -274,12 +289,11 @@ impl DeviceMopso {
         Generation::new(&self.settings, &self.earnings, sizes, self.counters.iteration)
     }
 
-    /// Tells the kernels of it. The members violate the constraints by so much.
-    fn announce(&self, members: usize, violation: f64) {
+    /// Tells the kernels of it.
+    fn announce(&self, generation: Generation) {
         let generation = Generation {
             constrained: u32::from(self.constrained),
-            violation: (violation as f32).min(UNKNOWN),
-            ..self.generation(members)
+            ..generation
         };
         self.context
             .write(&self.buffers.generation, bytemuck::bytes_of(&generation));
@@ -299,12 +313,6 @@ impl DeviceMopso {
         pass.dispatch_workgroups(x, y, z);
     }
 
-    /// Runs a kernel of the swarm for the present iteration against so many members.
-    fn dispatch(&self, kernel: &Kernel, members: usize) -> Result<()> {
-        self.announce(members, self.archive.violation());
-        self.context.run(|encoder| self.record(encoder, kernel))
-    }
-
     /// The first `bytes` of a buffer.
     fn read<T: bytemuck::Pod>(&self, from: &wgpu::Buffer, bytes: u64) -> Result<Vec<T>> {
         let readback = &self.buffers.readback;
@@ -312,9 +320,9 @@ impl DeviceMopso {
             .read_back((from, 0), readback, bytes, bytemuck::pod_collect_to_vec)
     }
 
-    /// Notes the particles that may enter an archive of these members, which violate the constraints by so much. If the swarm
-    /// `learns`, its personal bests learn first.
-    fn note(&self, members: &[[f64; 3]], violation: f64, learns: bool) -> Result<Noted> {
+    /// Notes the particles that may enter an archive of these members, which violate the constraints by so much where a violation of
+    /// `allowance` counts as none. If the swarm `learns`, its personal bests learn first.
+    fn note(&self, members: &[[f64; 3]], (violation, allowance): (f64, f64), learns: bool) -> Result<Noted> {
         let Buffers {
             archive,
             found,
@@ -327,19 +335,24 @@ impl DeviceMopso {
         let mut header = [0; HEADER as usize / 4];
         header[1] = UNKNOWN.to_bits();
         self.context.write(found, bytemuck::cast_slice(&header));
-        self.announce(members.len(), violation);
+        self.announce(Generation {
+            violation: (violation as f32).min(UNKNOWN),
+            allowance: below(allowance),
+            ..self.generation(members.len())
+        });
         let n = self.settings.motion.population;
         let most = n.min(AT_ONCE);
-        self.announce_gathering(most);
+        let d = self.space.dimensions();
+        self.announce_gathering(most, d);
         let head = HEADER + 16 * most as u64;
-        let row_bytes = (most * self.space.dimensions() * 4) as u64;
+        let row_bytes = (most * d * 4) as u64;
         let words: Vec<u32> = self.context.run_and_read_back(
             |encoder| {
                 if learns {
                     self.record(encoder, &self.kernels.learn);
                 }
                 self.record(encoder, &self.kernels.note);
-                self.record_gather(encoder, &self.buffers.gather, most);
+                self.record_gather(encoder, &self.buffers.gather, most * d);
             },
             &[(found, 0..head), (rows, 0..row_bytes)],
             readback,
@@ -349,40 +362,79 @@ impl DeviceMopso {
         let count = (list[0] as usize).min(n);
         let failures = Failure::WORDS
             .iter()
-            .zip(&list[2..])
+            .zip(&list[3..])
             .filter(|(_, count)| **count > 0)
             .map(|(word, count)| ((*word).to_owned(), u64::from(*count)));
         Ok(Noted {
             count,
             points: points_of(list, count),
             rows: rows.iter().map(|word| f32::from_bits(*word)).collect(),
-            violation: if self.constrained {
-                violation.min(f64::from(f32::from_bits(list[1])))
-            } else {
-                0.0
+            learnt: Learnt {
+                violations: match self.constrained {
+                    true => [list[1], list[2]].map(|word| f64::from(f32::from_bits(word))),
+                    false => [0.0; 2],
+                },
+                failures: failures.collect(),
             },
-            failures: failures.collect(),
         })
     }
 
-    /// Lets personal bests learn, and finds what enters the archive.
-    fn learn(&self) -> Result<Newcomers> {
+    /// Lets personal bests learn, and finds what enters the archive and that of pushed particles.
+    fn learn(&mut self) -> Result<(Vec<Newcomers>, FailureCounts)> {
+        let iteration = self.counters.iteration;
+        self.pushing.advance(&self.archive, &self.settings, iteration);
+        // Bests learn with the allowance of what is noted first.
+        let mut learnt = None;
+        let mut pushed = self.newcomers_of_pushed(&mut learnt)?;
+        let newcomers = self.newcomers(&self.archive, 0.0, &mut learnt)?;
+        let violated = learnt.as_ref().is_some_and(|learnt| learnt.violations[1] > 0.0);
+        self.pushing
+            .begin(violated, &self.archive, &self.settings, iteration);
+        if pushed.is_none() {
+            pushed = self.newcomers_of_pushed(&mut learnt)?;
+        }
+        let failures = learnt.map_or_else(FailureCounts::new, |learnt| learnt.failures);
+        Ok((std::iter::once(newcomers).chain(pushed).collect(), failures))
+    }
+
+    /// What enters the archive that pushed particles follow, if there is one.
+    fn newcomers_of_pushed(&self, learnt: &mut Option<Learnt>) -> Result<Option<Newcomers>> {
+        let Some(relaxation) = self.pushing.relaxation() else {
+            return Ok(None);
+        };
+        let mut newcomers = self.newcomers(&relaxation.archive, self.pushing.allowance(), learnt)?;
+        let particles = newcomers.found.iter().map(|(point, _)| point.who);
+        let width = self.rows();
+        let rows = self.gather((&self.buffers.gather_objectives, width), particles)?;
+        for ((_, position), row) in newcomers.found.iter_mut().zip(rows.chunks_exact(width)) {
+            position.extend(row.last().map(|violation| f64::from(violation.max(0.0))));
+        }
+        Ok(Some(newcomers))
+    }
+
+    /// What enters `archive`, where a violation of `allowance` counts as none. Personal bests learn first if they have not.
+    fn newcomers(&self, archive: &Archive, allowance: f64, learnt: &mut Option<Learnt>) -> Result<Newcomers> {
         let (d, width) = (self.space.dimensions(), self.objectives);
         let at = |row: &Vec<f64>| std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0));
-        let mut members: Vec<[f64; 3]> = self.archive.objectives.iter().map(at).collect();
-        let known = self.archive.violation();
-        let mut noted = self.note(&members, known, true)?;
-        let violation = noted.violation;
+        let mut members: Vec<[f64; 3]> = archive.objectives.iter().map(at).collect();
+        let known = archive.violation();
+        let level = |learnt: &Learnt| known.min(counted(learnt.violations[0], allowance));
+        let before = learnt.as_ref().map_or(known, level);
+        if before < known {
+            members.clear();
+        }
+        let mut noted = self.note(&members, (before, allowance), learnt.is_none())?;
+        let learnt = learnt.get_or_insert(std::mem::take(&mut noted.learnt));
+        let violation = level(learnt);
         if violation < known {
             // They leave the archive.
             members.clear();
         }
-        let failures = std::mem::take(&mut noted.failures);
         let mut sample = Vec::new();
         if noted.count > TOO_MANY && self.context.is_shaped_for_a_card() {
             sample = front(noted.points, width);
             members.extend(sample.iter().map(|p| p.at));
-            noted = self.note(&members, violation, false)?;
+            noted = self.note(&members, (violation, allowance), false)?;
         }
         let mut place = None;
         if noted.count > noted.points.len() {
@@ -398,43 +450,45 @@ impl DeviceMopso {
             front(noted.points, width),
             width,
             PER_PLACE * self.settings.archive,
-            self.archive.fixed_reference(),
+            archive.fixed_reference(),
         );
-        let rows = match place {
+        let rows: Vec<f32> = match place {
             Some(place) => {
                 let row = |p: &Point| &noted.rows[place[&p.who] * d..][..d];
                 points.iter().flat_map(row).copied().collect()
             }
-            None => self.gather(&self.buffers.gather, points.iter().map(|p| p.who))?,
+            None => self.gather((&self.buffers.gather, d), points.iter().map(|p| p.who))?,
         };
+        let position = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect();
         Ok(Newcomers {
-            points,
-            rows,
+            found: points
+                .into_iter()
+                .zip(rows.chunks_exact(d).map(position))
+                .collect(),
             violation,
-            failures,
         })
     }
 
-    /// Tells the kernel that gathers positions how many particles it takes at the most.
-    fn announce_gathering(&self, most: usize) {
-        let figures = [most as u32, self.space.dimensions() as u32, 0, 0];
+    /// Tells the kernel that gathers rows how many particles it takes at the most, and how many figures each has.
+    fn announce_gathering(&self, most: usize, width: usize) {
+        let figures = [most as u32, width as u32, 0, 0];
         self.context
             .write(&self.buffers.gathering, bytemuck::cast_slice(&figures));
     }
 
-    /// Records it.
-    fn record_gather(&self, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, most: usize) {
-        let (x, y) = groups(most * self.space.dimensions());
+    /// Records it for so many figures.
+    fn record_gather(&self, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, figures: usize) {
+        let (x, y) = groups(figures);
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(&self.kernels.gather.pipeline);
         pass.set_bind_group(0, group, &[]);
         pass.dispatch_workgroups(x, y, 1);
     }
 
-    /// Positions or own bests of these particles.
+    /// Rows of these particles, of so many figures: positions, own bests or objectives.
     fn gather(
         &self,
-        group: &wgpu::BindGroup,
+        (group, width): (&wgpu::BindGroup, usize),
         particles: impl ExactSizeIterator<Item = u32>,
     ) -> Result<Vec<f32>> {
         let count = particles.len();
@@ -446,10 +500,10 @@ impl DeviceMopso {
         list.extend(particles.flat_map(|who| [who, 0, 0, 0]));
         self.context
             .write(&self.buffers.found, bytemuck::cast_slice(&list));
-        self.announce_gathering(count);
-        let bytes = (count * self.space.dimensions() * 4) as u64;
+        self.announce_gathering(count, width);
+        let bytes = (count * width * 4) as u64;
         self.context.run_and_read_back(
-            |encoder| self.record_gather(encoder, group, count),
+            |encoder| self.record_gather(encoder, group, count * width),
             &[(&self.buffers.rows, 0..bytes)],
             &self.buffers.readback,
             bytemuck::pod_collect_to_vec,
@@ -487,30 +541,24 @@ impl DeviceMopso {
     /// [`Error::Device`] if the device fails.
     pub fn learn_and_move(&mut self) -> Result<Progress> {
         let d = self.space.dimensions();
-        let members = self.archive.len();
-        let Newcomers {
-            points,
-            rows,
-            violation,
-            failures,
-        } = self.learn()?;
-        let position = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect();
-        let solutions = points.into_iter().zip(rows.chunks_exact(d).map(position));
-        let generation = self.generation(members);
-        let solutions = solutions.collect();
-        take_in(
-            &mut self.archive,
-            &mut self.earnings,
-            &generation,
-            solutions,
-            violation,
-        );
+        let generation = self.generation(self.archive.len());
+        let (newcomers, failures) = self.learn()?;
+        let state = (&mut self.archive, &mut self.pushing, &mut self.earnings);
+        take_in(state, &generation, newcomers);
         self.counters.told(self.settings.motion.population);
-        let leaders = self.leaders()?;
+        measure(&mut self.archive, &mut self.pushing);
+        let mut leaders = self.leaders(&self.archive)?;
+        let members = leaders.len() / d;
+        if let Some(relaxation) = self.pushing.relaxation() {
+            leaders.extend(self.leaders(&relaxation.archive)?);
+        }
         self.context
             .write(&self.buffers.archive, bytemuck::cast_slice(&leaders));
         // The host goes on meanwhile: the evaluation that follows waits for it.
-        self.announce(leaders.len() / d, self.archive.violation());
+        self.announce(Generation {
+            pushed_members: (leaders.len() / d - members) as u32,
+            ..self.generation(members)
+        });
         let groups = sliced_groups(&self.context, self.settings.motion.population, d);
         self.context
             .run_ahead(|encoder| self.record_groups(encoder, &self.kernels.advance, groups))?;
@@ -526,21 +574,22 @@ impl DeviceMopso {
     }
 
     /// The positions that lead and mate, as on the host.
-    fn leaders(&mut self) -> Result<Vec<f32>> {
-        let mut leading = leaders(&mut self.archive);
-        if !self.constrained || !StandIns::are_possible(&self.archive, &self.settings) {
-            return Ok(leading);
+    fn leaders(&self, archive: &Archive) -> Result<Vec<f32>> {
+        let d = self.space.dimensions();
+        if !self.constrained || !StandIns::are_possible(archive, &self.settings) {
+            return Ok(leaders(archive, d));
         }
         let n = self.settings.motion.population;
         let bytes = n.next_multiple_of(BLOCK) * self.rows() * 4;
         let bests: Vec<f32> = self.read(&self.buffers.best_objectives, bytes as u64)?;
         let violations = last_row(&bests, n, self.rows());
-        let stand_ins = StandIns::draw(&self.archive, &self.settings, self.counters, &violations);
-        if stand_ins.instead_of_members {
-            leading.clear();
-        }
+        let stand_ins = StandIns::draw(archive, &self.settings, self.counters, &violations);
+        let mut leading = match stand_ins.instead_of_members {
+            true => Vec::new(),
+            false => leaders(archive, d),
+        };
         let particles = stand_ins.particles.iter().map(|particle| *particle as u32);
-        leading.extend(self.gather(&self.buffers.gather_bests, particles)?);
+        leading.extend(self.gather((&self.buffers.gather_bests, d), particles)?);
         Ok(leading)
     }
 

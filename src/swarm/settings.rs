@@ -270,8 +270,8 @@ pub struct MopsoSettings {
     /// members leave by contribution and no reference is given, the ends of the front win every tournament of a swarm of fewer
     /// than [`super::MANY`] particles.
     pub leaders: Leaders,
-    /// Whether half of the particles of a swarm of fewer than [`super::MANY`] ignore constraints at first and take them back step by
-    /// step \[10\]. They ignore them for three tenths of the planned iterations at most, and take them back over half of these.
+    /// Whether half of the particles ignore constraints at first and take them back step by step \[10\]. They ignore them for three
+    /// tenths of the planned iterations at most, and take them back over half of these.
     pub push_and_pull: bool,
 }
 

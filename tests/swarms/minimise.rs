@@ -5,7 +5,7 @@ use lapswarm::evaluate::{Objective, Problem, Variable};
 use lapswarm::swarm::checkpoint::{load_optimiser, save_optimiser};
 use lapswarm::swarm::metrics::hypervolume;
 use lapswarm::swarm::{
-    Front, Islands, MULTI_OBJECTIVE, Minimum, Mopso, MopsoSettings, Optimiser, SINGLE_OBJECTIVE, Sizes,
+    Front, Islands, MANY, MULTI_OBJECTIVE, Minimum, Mopso, MopsoSettings, Optimiser, SINGLE_OBJECTIVE, Sizes,
     Stopped, by_name, run, step,
 };
 use lapswarm::{minimise, minimise_batch, minimise_several};
@@ -309,15 +309,24 @@ fn about_a_line(x: &[f64], f: &mut [f64]) -> f64 {
     distance
 }
 
-/// The sorted hypervolumes of eleven seeds, of objectives less `least`, up to 1.1.
-fn constrained_volumes(variables: usize, least: f64, violation: impl Fn(f64) -> f64) -> Vec<f64> {
+/// The usual swarm and evaluations of eleven seeds, and a large swarm and sixty generations of five.
+const SIZES: [(usize, usize, u64); 2] = [(100, 25_000, 11), (MANY + 100, 60 * (MANY + 100), 5)];
+
+/// The sorted hypervolumes, of objectives less `least`, up to 1.1.
+fn constrained_volumes(
+    (population, evaluations, seeds): (usize, usize, u64),
+    variables: usize,
+    least: f64,
+    violation: impl Fn(f64) -> f64,
+) -> Vec<f64> {
     let volume = |seed: u64| {
         let found = minimise_several(&vec![(0.0, 1.0); variables], 2, |x, f| {
             f[2] = violation(about_a_line(x, f))
         });
         let found = found
             .constraints(vec![Constraint::at_most_zero()])
-            .evaluations(25_000)
+            .evaluations(evaluations)
+            .population(population)
             .seed(seed);
         let found = found.run().unwrap();
         assert!(found.is_feasible());
@@ -329,7 +338,7 @@ fn constrained_volumes(variables: usize, least: f64, violation: impl Fn(f64) -> 
             .collect();
         hypervolume(&rows, &[1.1, 1.1]).unwrap()
     };
-    let mut volumes: Vec<f64> = (1..=11).map(volume).collect();
+    let mut volumes: Vec<f64> = (1..=seeds).map(volume).collect();
     volumes.sort_by(f64::total_cmp);
     volumes
 }
@@ -338,16 +347,22 @@ fn constrained_volumes(variables: usize, least: f64, violation: impl Fn(f64) -> 
 /// keeps to its constraints from the start finds nothing of it with ten of these seeds.
 #[test]
 fn infeasible_land_is_crossed() {
-    let volumes = constrained_volumes(20, 0.0, |distance| (distance - 0.02).min(1.2 - distance));
-    assert!(volumes[0] > 0.871, "{volumes:?}");
+    for size in SIZES {
+        let ring = |distance: f64| (distance - 0.02).min(1.2 - distance);
+        let volumes = constrained_volumes(size, 20, 0.0, ring);
+        assert!(volumes[0] > 0.871, "{size:?}: {volumes:?}");
+    }
 }
 
 /// All that is feasible is a thin shell, and the front runs along it. A swarm that keeps to its constraints from the start ends at a median
 /// of 0.634, and at 0.797 at best.
 #[test]
 fn a_thin_shell_is_followed() {
-    let volumes = constrained_volumes(10, 0.299, |distance| (distance - 0.3).abs() - 0.001);
-    assert!(volumes[5] > 0.82, "{volumes:?}");
+    for size in SIZES {
+        let shell = |distance: f64| (distance - 0.3).abs() - 0.001;
+        let volumes = constrained_volumes(size, 10, 0.299, shell);
+        assert!(volumes[volumes.len() / 2] > 0.82, "{size:?}: {volumes:?}");
+    }
 }
 
 /// While constraints are ignored, while they come back, and after that.
@@ -366,18 +381,21 @@ fn relaxed_constraints_resume() {
     let mut evaluator = PointEvaluator::constrained(problem.clone(), limits, CallCost::Cheap, function);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("swarm.ckpt");
-    let mut whole = Mopso::new(&problem, MopsoSettings::default().with_size(40, 100)).unwrap();
-    let mut part: Box<dyn Optimiser + Send> = Box::new(whole.clone());
-    for iteration in 0..100 {
-        if [5, 20, 50, 95].contains(&iteration) {
-            save_optimiser(&path, &part).unwrap();
-            part = load_optimiser(&path).unwrap();
+    for population in [40, MANY] {
+        let settings = MopsoSettings::default().with_size(population, 100);
+        let mut whole = Mopso::new(&problem, settings).unwrap();
+        let mut part: Box<dyn Optimiser + Send> = Box::new(whole.clone());
+        for iteration in 0..100 {
+            if [5, 20, 50, 95].contains(&iteration) {
+                save_optimiser(&path, &part).unwrap();
+                part = load_optimiser(&path).unwrap();
+            }
+            let (a, b) = (step(&mut whole, &mut evaluator), step(&mut part, &mut evaluator));
+            assert_eq!(a.unwrap(), b.unwrap(), "{iteration}");
         }
-        let (a, b) = (step(&mut whole, &mut evaluator), step(&mut part, &mut evaluator));
-        assert_eq!(a.unwrap(), b.unwrap(), "{iteration}");
+        assert_eq!(whole.to_checkpoint().unwrap(), part.to_checkpoint().unwrap());
+        assert!(whole.front().is_feasible());
     }
-    assert_eq!(whole.to_checkpoint().unwrap(), part.to_checkpoint().unwrap());
-    assert!(whole.front().is_feasible());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `lapswarm bench optimisers`: every algorithm on every problem of the suites.
 
 use super::pages::of_optimisers;
-use crate::cli::measurement::FolderFlag;
+use crate::cli::measurement::MeasurementFlags;
 use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::files::write_whole;
 use lapswarm::swarm::comparison::{Score, compare, quartiles};
@@ -38,7 +38,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     fronts: Option<PathBuf>,
     #[command(flatten)]
-    kept: FolderFlag,
+    kept: MeasurementFlags,
 }
 
 /// One algorithm on one problem; hypervolume for several objectives, error for one.
@@ -108,10 +108,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         // A file that cannot be written is refused before hours of runs.
         write_whole(path, fronts.as_bytes())?;
     }
-    if !arguments.kept.json {
-        outln!("medians and interquartile ranges of {} seeds", arguments.seeds);
-        outln!("{}", line_of(COLUMNS, None));
-    }
+    outln!("medians and interquartile ranges of {} seeds", arguments.seeds);
+    outln!("{}", line_of(COLUMNS, None));
     for problem in names
         .into_iter()
         .filter(|n| wanted(&arguments.problems, n))
@@ -132,9 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 add_fronts(&mut fronts, problem.name(), algorithm, &scores);
             }
             let row = row_of(&problem, algorithm, &scores);
-            if !arguments.kept.json {
-                outln!("{}", line_of(COLUMNS, Some(&row)));
-            }
+            outln!("{}", line_of(COLUMNS, Some(&row)));
             rows.push(row);
         }
     }
@@ -145,9 +141,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         study: "bench optimisers",
         rows,
     };
-    keeping.finish(!arguments.kept.json, &table, ["cpu"], |folder| {
-        of_optimisers(folder, &table.rows)
-    })
+    keeping.finish(&table, ["cpu"], |folder| of_optimisers(folder, &table.rows))
 }
 
 /// A line for each member of each front.

@@ -3,7 +3,7 @@
 use super::machine::{forget_peak_memory, peak_memory_bytes, peak_operations_per_s};
 use super::pages::{of_scaling, rates};
 use crate::cli::backend_flag;
-use crate::cli::measurement::{FolderFlag, distinct};
+use crate::cli::measurement::{MeasurementFlags, distinct};
 use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::config::read_text;
@@ -59,10 +59,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
     #[command(flatten)]
-    kept: FolderFlag,
-    /// No table
-    #[arg(long)]
-    quiet: bool,
+    kept: MeasurementFlags,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -347,9 +344,7 @@ impl Bench for Rates<'_> {
                 }
                 let row = self.measure(name, case, evaluator.as_mut(), population)?;
                 rate = Some(row.evaluations_per_s);
-                if !self.arguments.quiet {
-                    self.print(&row);
-                }
+                self.print(&row);
                 self.rows.push(row);
             }
         }
@@ -409,15 +404,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let began = Instant::now();
     let threads = rayon::current_num_threads();
     let peak = threads as f64 * peak_operations_per_s(InstructionSet::best());
-    if !arguments.quiet {
-        outln!(
-            "{threads} threads, {:.0} billion unfused {} operations per second at best",
-            peak / 1e9,
-            InstructionSet::best().name()
-        );
-        let times = if other.is_some() { "   times the other" } else { "" };
-        outln!("{}{times}", line_of(COLUMNS, None));
-    }
+    outln!(
+        "{threads} threads, {:.0} billion unfused {} operations per second at best",
+        peak / 1e9,
+        InstructionSet::best().name()
+    );
+    let times = if other.is_some() { "   times the other" } else { "" };
+    outln!("{}{times}", line_of(COLUMNS, None));
     let mut bench = Rates {
         arguments,
         other,
@@ -444,7 +437,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rates(&table.rows).write_svg(path)?;
     }
     let backends = table.rows.iter().map(|r| r.backend.as_str());
-    keeping.finish(!arguments.quiet, &table, backends, |folder| {
+    keeping.finish(&table, backends, |folder| {
         of_scaling(folder, &table, other.as_ref())
     })
 }

@@ -2,7 +2,7 @@
 
 use super::pages::{of_studies, qualities};
 use crate::cli::backend_flag;
-use crate::cli::measurement::FolderFlag;
+use crate::cli::measurement::MeasurementFlags;
 use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::line::{LineObjective, LineProblem};
@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
-    kept: FolderFlag,
+    kept: MeasurementFlags,
 }
 
 /// Compares the optimisers on a problem.
@@ -257,9 +257,7 @@ impl<K: OnDevice> Case<K> {
         for &population in &arguments.populations {
             for algorithm in &algorithms {
                 let row = self.measure(algorithm, population as usize, arguments)?;
-                if !arguments.kept.json {
-                    outln!("{}", line_of(COLUMNS, Some(&row)));
-                }
+                outln!("{}", line_of(COLUMNS, Some(&row)));
                 table.rows.push(row);
             }
         }
@@ -353,16 +351,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         problems: Vec::new(),
         rows: Vec::new(),
     };
-    if !arguments.kept.json {
-        outln!(
-            "{} evaluations, archive of {}, {} threads, medians of {} seeds; hypervolume as a share of the problem's box",
-            arguments.evaluations,
-            arguments.archive,
-            table.threads,
-            arguments.seeds
-        );
-        outln!("{}", line_of(COLUMNS, None));
-    }
+    outln!(
+        "{} evaluations, archive of {}, {} threads, medians of {} seeds; hypervolume as a share of the problem's box",
+        arguments.evaluations,
+        arguments.archive,
+        table.threads,
+        arguments.seeds
+    );
+    outln!("{}", line_of(COLUMNS, None));
     for name in &arguments.problems {
         for (_, compare) in PROBLEMS.iter().filter(|(known, _)| known == name) {
             compare(arguments, &mut table)?;
@@ -372,9 +368,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         qualities(&table.rows).write_svg(path)?;
     }
     let backends = table.problems.iter().map(|p| p.backend);
-    keeping.finish(!arguments.kept.json, &table, backends, |folder| {
-        of_studies(folder, &table.rows)
-    })
+    keeping.finish(&table, backends, |folder| of_studies(folder, &table.rows))
 }
 
 /// The table on a terminal.

@@ -2,7 +2,7 @@
 
 use super::pages::of_swarm;
 use crate::cli::backend_flag;
-use crate::cli::measurement::FolderFlag;
+use crate::cli::measurement::MeasurementFlags;
 use crate::cli::output::{Columns, line_of, outln};
 use lapswarm::evaluate::gpu::{GpuContext, devices};
 use lapswarm::evaluate::simd::InstructionSet;
@@ -40,7 +40,7 @@ pub struct Arguments {
     #[arg(long)]
     adapter: Option<String>,
     #[command(flatten)]
-    kept: FolderFlag,
+    kept: MeasurementFlags,
 }
 
 /// One population on one problem.
@@ -89,13 +89,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rows: Vec::new(),
         growth: Vec::new(),
     };
-    if !arguments.kept.json {
-        outln!(
-            "milliseconds per generation of the optimiser alone, {} threads",
-            table.threads
-        );
-        outln!("{}", line_of(COLUMNS, None));
-    }
+    outln!(
+        "milliseconds per generation of the optimiser alone, {} threads",
+        table.threads
+    );
+    outln!("{}", line_of(COLUMNS, None));
     for name in &arguments.problems {
         let own = TestProblem::by_name(name).filter(|p| p.problem().objectives.len() > 1);
         let own = own.ok_or_else(|| {
@@ -115,9 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             for &population in arguments.populations.iter().filter(|_| wanted) {
                 let row = measure(&problem, population, here, arguments)?;
                 times.push((population as f64, row.generation_ms));
-                if !arguments.kept.json {
-                    outln!("{}   {}", line_of(COLUMNS, Some(&row)), row.device);
-                }
+                outln!("{}   {}", line_of(COLUMNS, Some(&row)), row.device);
                 table.rows.push(row);
             }
             if times.len() > 1 {
@@ -126,22 +122,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                     problem: problem.name(),
                     exponent: slope(&times),
                 };
-                if !arguments.kept.json {
-                    outln!(
-                        "{:<8}{:<8} time grows as particles^{:.2}",
-                        growth.backend,
-                        growth.problem,
-                        growth.exponent
-                    );
-                }
+                outln!(
+                    "{:<8}{:<8} time grows as particles^{:.2}",
+                    growth.backend,
+                    growth.problem,
+                    growth.exponent
+                );
                 table.growth.push(growth);
             }
         }
     }
     let backends = table.rows.iter().map(|r| r.backend);
-    keeping.finish(!arguments.kept.json, &table, backends, |folder| {
-        of_swarm(folder, &table.rows)
-    })
+    keeping.finish(&table, backends, |folder| of_swarm(folder, &table.rows))
 }
 
 /// The table on a terminal.

@@ -2,7 +2,7 @@
 
 use super::pages::of_tune;
 use super::scaling::{Bench, Case, measure_named, problems};
-use crate::cli::measurement::FolderFlag;
+use crate::cli::measurement::MeasurementFlags;
 use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::gpu::{DeviceKind, GpuContext, Tuning};
@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long)]
     adapter: Option<String>,
     #[command(flatten)]
-    kept: FolderFlag,
+    kept: MeasurementFlags,
 }
 
 /// One setting on one problem.
@@ -143,9 +143,7 @@ impl Bench for Trials<'_> {
                 times_usual: usual_ms / kernel_ms,
                 same_bits,
             };
-            if !self.arguments.kept.json {
-                outln!("{}", line_of(COLUMNS, Some(&row)));
-            }
+            outln!("{}", line_of(COLUMNS, Some(&row)));
             self.rows.push(row);
         }
         Ok(())
@@ -204,10 +202,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let summary = GpuContext::shared(adapter)?.summary().clone();
     // Its device closes before others open.
     GpuContext::forget();
-    if !arguments.kept.json {
-        outln!("{summary}");
-        outln!("{}", line_of(COLUMNS, None));
-    }
+    outln!("{summary}");
+    outln!("{}", line_of(COLUMNS, None));
     let mut trials = Trials {
         arguments,
         kind: summary.kind,
@@ -220,9 +216,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         "Remembered in {file}: workgroups of {}, {} lanes, {times_usual:.2} times as fast as usual.",
         tuning.workgroup, tuning.lanes
     );
-    if !arguments.kept.json {
-        outln!("{told}");
-    }
+    outln!("{told}");
     let table = Table {
         study: "bench tune",
         adapter: summary.to_string(),
@@ -234,9 +228,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         },
         rows: trials.rows,
     };
-    keeping.finish(!arguments.kept.json, &table, ["gpu"], |folder| {
-        of_tune(folder, &table.rows, told)
-    })
+    keeping.finish(&table, ["gpu"], |folder| of_tune(folder, &table.rows, told))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::pages::of_whole;
 use super::scaling::{Bench, Case, measure_named, problems};
 use crate::cli::backend_flag;
-use crate::cli::measurement::FolderFlag;
+use crate::cli::measurement::MeasurementFlags;
 use crate::cli::output::{Columns, line_of, outln};
 use clap::builder::PossibleValuesParser;
 use lapswarm::evaluate::gpu::{GpuContext, devices};
@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long)]
     adapter: Option<String>,
     #[command(flatten)]
-    kept: FolderFlag,
+    kept: MeasurementFlags,
 }
 
 /// One population of one problem.
@@ -187,9 +187,7 @@ impl Generations<'_> {
                 kernel_ms,
                 outside_kernels_share: (1.0 - kernel_ms / generation_ms).clamp(0.0, 1.0),
             };
-            if !self.arguments.kept.json {
-                outln!("{}   {}", line_of(COLUMNS, Some(&row)), row.adapter);
-            }
+            outln!("{}   {}", line_of(COLUMNS, Some(&row)), row.adapter);
             self.rows.push(row);
         }
         Ok(())
@@ -245,10 +243,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .kept
         .begin("bench whole", arguments.adapter.as_deref())?;
     let threads = rayon::current_num_threads();
-    if !arguments.kept.json {
-        outln!("whole generations, {threads} threads");
-        outln!("{}", line_of(COLUMNS, None));
-    }
+    outln!("whole generations, {threads} threads");
+    outln!("{}", line_of(COLUMNS, None));
     let mut bench = Generations {
         arguments,
         rows: Vec::new(),
@@ -261,7 +257,5 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rows: bench.rows,
     };
     let backends = table.rows.iter().map(|r| r.backend);
-    keeping.finish(!arguments.kept.json, &table, backends, |folder| {
-        of_whole(folder, &table.rows)
-    })
+    keeping.finish(&table, backends, |folder| of_whole(folder, &table.rows))
 }

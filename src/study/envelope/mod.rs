@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::evaluate::BackendChoice;
 use crate::study::framework::journal::Journal;
 use crate::study::framework::memory::{ANSWER, MemoryItem};
+use crate::study::framework::shared_settings::{adapter, channel_map};
 use crate::study::framework::{Plan, RunRecord, Solved, Study, Subject, Work};
 use crate::telemetry::{ChannelMap, Log, LogOptions};
 use crate::vehicle::Car;
@@ -33,8 +34,7 @@ settings! {
             "The car: a bundled name (gt) or a TOML file, such as the one that identify writes";
         log: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap.csv\""),
             "A log that is held against the limits: CSV (ours, MoTeC i2, RaceChrono, others), MoTeC .ld or VBOX .vbo";
-        channel_map: Option<PathBuf> ["-"] = None, optional(file()).example("\"channels.toml\""),
-            "Channel names, units, signs and delays of the log, as TOML; without it they are guessed";
+        channel_map: Option<PathBuf> = channel_map;
         from_mps: Option<f64> ["m/s"] = None, optional(number(3.0, 150.0)).example("18.0"),
             "Slowest speed, below which the limits are taken to be its; without it 18, or less where the lock leaves the limit to the tyres";
         to_mps: f64 ["m/s"] = SpeedRange::USUAL.to_mps, number(4.0, 160.0),
@@ -45,8 +45,7 @@ settings! {
             "Steering angles of the surface, from straight on to the lock";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where the surface is evaluated; the limits are worked out in f64";
-        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
-            "Part of the name of the GPU to use, its place on the PCI bus, or all for several";
+        adapter: Option<String> = adapter;
     }
 
     fn consistent(&self) -> Result<()> {

@@ -9,6 +9,7 @@ pub mod memory;
 mod plan;
 mod record;
 pub mod setups;
+pub(in crate::study) mod shared_settings;
 pub mod state_file;
 mod study;
 mod tyres;

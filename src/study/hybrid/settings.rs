@@ -13,6 +13,10 @@ use crate::evaluate::energy::{Free, HybridObjective, MOST_MOTOR};
 use crate::files::stem;
 use crate::line::energy::{Gates, Mode};
 use crate::study::framework::memory::Size;
+use crate::study::framework::shared_settings::{
+    adapter, cognitive, entry_mps, envelope, inertia, islands, mutation, seed, social, steering_rate_deg_s,
+    swarm,
+};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::study::raceline::RacelineSettings;
 use crate::swarm::{FrontSearch, MopsoSettings, Mutation, PsoSettings, Schedule, SwarmPlace};
@@ -109,8 +113,7 @@ settings! {
             "The circuit: a bundled name, a shape such as stadium:500:100:12, or a file";
         car: String ["-"] = "gt_hybrid".to_owned(), name_or_file(),
             "The car, with an engine map and a hybrid drive: a bundled name (gt_hybrid) or a TOML file";
-        envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
-            "A g-g-v envelope (columns v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own";
+        envelope: Option<PathBuf> = envelope;
         line: Option<PathBuf> ["-"] = None, optional(file()).example("\"line_fastest.csv\""),
             "A line (CSV with columns x and y in m) instead of the fastest one";
         sections: Option<usize> ["-"] = None, optional(count(8, 1_000_000)).example("960"),
@@ -119,10 +122,8 @@ settings! {
             "Greatest distance between the points at which energy is accounted";
         car_width_m: f64 ["m"] = 2.0, number(0.0, 10.0),
             "Width of the car";
-        steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
-            "Fastest turn of the front wheels; without it the car's own";
-        entry_mps: f64 ["m/s"] = 10.0, number(0.5, 150.0),
-            "Greatest speed at the start of an open track";
+        steering_rate_deg_s: Option<f64> = steering_rate_deg_s;
+        entry_mps: f64 = entry_mps;
         scenarios: Vec<Scenario> ["-"] = published(), of(Scenarios),
             "Strategies set by hand, each a table of its mode (offset or additional) and its gates";
         optimise: bool ["-"] = true, switch(true).flag(Flag::Switch("scenarios_only", false)),
@@ -151,28 +152,20 @@ settings! {
             "Which swarms share the energy out; nsga2 is NSGA-II for the front";
         warm_start: Option<bool> ["-"] = None, optional(switch(true)).flag(Flag::Switch("no_warm_start", false)).search().example("true"),
             "Whether the front's swarm starts from the line and even shares; by default it does, except with algorithm thesis";
-        inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.5, 0.1]"),
-            "Inertia weight with thesis: a number, or the first and the last of a linear schedule; without it the algorithm's own";
-        cognitive: Option<Schedule> ["-"] = None, of(Scheduled).search().example("1.5"),
-            "Pull towards the particle's own best, as inertia is given";
-        social: Option<Schedule> ["-"] = None, of(Scheduled).search().example("2.5"),
-            "Pull towards the leader, as inertia is given";
-        mutation: Option<Mutation> ["-"] = None, of(Mutated).search().example("0.3"),
-            "Mutation with thesis: an exponent from 0 (none) to 10, random or polynomial; without it the algorithm's own";
-        islands: usize ["-"] = 1, count(1, 1000).search(),
-            "Swarms for the front, each of the whole population; five members of each go to the next one every ten iterations";
+        inertia: Option<Schedule> = inertia;
+        cognitive: Option<Schedule> = cognitive;
+        social: Option<Schedule> = social;
+        mutation: Option<Mutation> = mutation;
+        islands: usize = islands;
         population: usize ["-"] = 64, count(8, 10_000_000).search(),
             "Particles of the swarms";
         iterations: usize ["-"] = 300, count(1, 1_000_000).search(),
             "Iterations of the swarms";
-        seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
-            "Seed of all random numbers";
-        swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
-            "Where the particles of the front and of algorithm thesis live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
+        seed: u64 = seed;
+        swarm: SwarmPlace = swarm;
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where laps are evaluated";
-        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
-            "Part of the name of the GPU to use, its place on the PCI bus, or all for several";
+        adapter: Option<String> = adapter;
     }
 
     fn consistent(&self) -> Result<()> {

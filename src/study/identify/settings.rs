@@ -12,6 +12,9 @@ use crate::evaluate::BackendChoice;
 use crate::evaluate::replay::{CHANNEL_NAMES, Norm};
 use crate::files::run_folder::SUMMARY;
 use crate::study::framework::memory::Size;
+use crate::study::framework::shared_settings::{
+    adapter, channel_map, cognitive, inertia, islands, seed, social,
+};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::swarm::{FrontSearch, Mutation, Schedule, SwarmPlace};
 use crate::telemetry::CalibrationOptions;
@@ -171,8 +174,7 @@ settings! {
             "How much of the car there is: with roll, four wheels without roll and load transfer, or a bicycle, which has no track either";
         log: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap.csv\""),
             "The log: CSV (ours, MoTeC i2, RaceChrono, others), MoTeC .ld or VBOX .vbo; without it the bundled lap";
-        channel_map: Option<PathBuf> ["-"] = None, optional(file()).example("\"channels.toml\""),
-            "Channel names, units, signs and delays of the log, as TOML; without it they are guessed";
+        channel_map: Option<PathBuf> = channel_map;
         track: Option<String> ["-"] = None, optional(name_or_file()).example("\"silverstone_gp\""),
             "The circuit that sections are named on: a bundled name, a TOML file, a survey (CSV, GPX, KML, log) or a shape";
         truth: Option<String> ["-"] = None, optional(name_or_file()).example("\"gt\""),
@@ -211,30 +213,24 @@ settings! {
             "Particles; without it the algorithm's own number";
         iterations: Option<usize> as "swarm.iterations" ["-"] = None, optional(count(1, 100_000_000)).search().example("1500"),
             "Iterations; without it the algorithm's own number";
-        inertia: Option<Schedule> as "swarm.inertia" ["-"] = None, of(Scheduled).search().example("[0.9, 0.4]"),
-            "Inertia weight: a number, or the first and the last of a linear schedule; without it the algorithm's own";
-        cognitive: Option<Schedule> as "swarm.cognitive" ["-"] = None, of(Scheduled).search().example("1.5"),
-            "Pull towards the particle's own best, as inertia is given";
-        social: Option<Schedule> as "swarm.social" ["-"] = None, of(Scheduled).search().example("1.5"),
-            "Pull towards the leader, as inertia is given";
+        inertia: Option<Schedule> as "swarm.inertia" = inertia;
+        cognitive: Option<Schedule> as "swarm.cognitive" = cognitive;
+        social: Option<Schedule> as "swarm.social" = social;
         mutation: Option<Mutation> as "swarm.mutation" ["-"] = None, of(Mutated).search().example("\"polynomial\""),
             "Mutation of the swarm: an exponent from 0 (none) to 10, random or polynomial";
-        islands: usize as "swarm.islands" ["-"] = 1, count(1, 1000).search(),
-            "Swarms for several objectives, each of the whole population; five members of each go to the next one every ten iterations";
+        islands: usize as "swarm.islands" = islands;
         archive: usize as "swarm.archive" ["-"] = 100, count(2, 100_000).search(),
             "Members of the archive of the multi-objective swarm";
         place: SwarmPlace as "swarm.place" ["-"] = SwarmPlace::Auto, choice().flag(Flag::Value("swarm")).search(),
             "Where the particles of a front and of algorithm thesis live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
-        seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
-            "Seed of all random numbers";
+        seed: u64 = seed;
         polish: bool ["-"] = true, switch(true).flag(Flag::Switch("no_polish", false)).search(),
             "Whether the swarm's best is polished by least squares";
         hops: usize ["-"] = 4, count(0, 1000).search(),
             "Further polishes, each from the best of 1024 draws, while the errors that remain do not look like noise";
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where candidates are evaluated";
-        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
-            "Part of the name of the GPU to use, its place on the PCI bus, or all for several";
+        adapter: Option<String> = adapter;
     }
 
     fn consistent(&self) -> Result<()> {

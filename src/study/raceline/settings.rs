@@ -11,6 +11,10 @@ use crate::evaluate::{BackendChoice, Problem};
 use crate::line::{CarPlan, TERMS};
 use crate::study::framework::memory::Size;
 use crate::study::framework::setups::{MOST_SETUPS, check_parameters};
+use crate::study::framework::shared_settings::{
+    adapter, cognitive, entry_mps, envelope, inertia, islands, mutation, seed, share, social,
+    steering_rate_deg_s, swarm,
+};
 use crate::study::framework::{Coefficients, Mutated, Scheduled};
 use crate::swarm::{
     CooperativeSettings, FrontSearch, MopsoSettings, Mutation, PsoSettings, Schedule, SwarmPlace,
@@ -46,8 +50,7 @@ settings! {
             "The circuit: a bundled name, a shape such as circle:590:600, or a file (TOML, CSV, GPX, KML, a log with GPS)";
         car: String ["-"] = "gt".to_owned(), name_or_file(),
             "The car whose g-g-v envelope is swept: a bundled name (gt) or a TOML file";
-        envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
-            "A g-g-v envelope (columns v_mps, ay_mps2, ax_grip_mps2, ax_drive_mps2, drag_mps2) instead of the car's own";
+        envelope: Option<PathBuf> = envelope;
         section: Option<String> ["-"] = None, optional(text()).example("\"Abbey\""),
             "Only this named stretch of the track, or a sector such as 3/12 of its cross-sections, as an open road";
         sections: Option<usize> ["-"] = None, optional(count(8, 1_000_000)).example("960"),
@@ -62,10 +65,8 @@ settings! {
             "Room that is left between the car and either edge";
         ellipse_exponent: f64 ["-"] = 2.0, number(1.0, 4.0),
             "Exponent of the friction ellipse";
-        steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
-            "Fastest turn of the front wheels, where a line would need a faster one the car is slower; without it the car's own";
-        entry_mps: f64 ["m/s"] = 10.0, number(0.5, 150.0),
-            "Greatest speed at the start of an open track";
+        steering_rate_deg_s: Option<f64> = steering_rate_deg_s;
+        entry_mps: f64 = entry_mps;
         objectives: Vec<LineObjective> ["-"] = usual_objectives(), choices(),
             "What is minimised; more than one for a front";
         surface_sections: Vec<u32> ["-"] = Vec::new(), counts().example("[120, 180]"),
@@ -78,18 +79,13 @@ settings! {
             "Set-ups of the car that each get a fastest line of their own, beside the car as it is";
         parameters: Vec<String> ["-"] = ["mass_kg", "downforce_area_m2"].map(str::to_owned).to_vec(), texts(),
             "Parameters that set-ups move";
-        share: f64 ["-"] = 0.1, number(1e-6, 1.0),
-            "How far each goes either way, as a share of its value";
+        share: f64 = share;
         algorithm: LineAlgorithm ["-"] = LineAlgorithm::Windows, choice().search(),
             "What looks for the best line by one objective; cooperative (CPSO-S_K) and thesis start at random; nsga2 is windows, and NSGA-II for the front";
-        inertia: Option<Schedule> ["-"] = None, of(Scheduled).search().example("[0.1, 1.0]"),
-            "Inertia weight with cooperative or thesis: a number, or the first and the last of a linear schedule; without it the algorithm's own";
-        cognitive: Option<Schedule> ["-"] = None, of(Scheduled).search().example("3.0"),
-            "Pull towards the particle's own best, as inertia is given";
-        social: Option<Schedule> ["-"] = None, of(Scheduled).search().example("1.0"),
-            "Pull towards the leader, as inertia is given";
-        mutation: Option<Mutation> ["-"] = None, of(Mutated).search().example("0.95"),
-            "Mutation with thesis: an exponent from 0 (none) to 10, random or polynomial; without it the algorithm's own";
+        inertia: Option<Schedule> = inertia;
+        cognitive: Option<Schedule> = cognitive;
+        social: Option<Schedule> = social;
+        mutation: Option<Mutation> = mutation;
         sectors: usize ["-"] = 1, count(1, 1000).search(),
             "Sectors in which thesis looks for the line, one after another, each from where the one before ends; 1 is the whole line";
         groups: usize ["-"] = 12, count(1, 1_000_000).search(),
@@ -98,18 +94,14 @@ settings! {
             "Particles of the swarm for the front, and of each objective's with cooperative or thesis; windows have their own";
         iterations: usize ["-"] = 200, count(1, 1_000_000).search(),
             "Iterations of these swarms; without effect for one objective searched by windows";
-        islands: usize ["-"] = 1, count(1, 1000).search(),
-            "Swarms for the front, each of the whole population; five members of each go to the next one every ten iterations";
+        islands: usize = islands;
         archive: usize ["-"] = 100, count(8, 10_000).search(),
             "Lines that the front keeps";
-        seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
-            "Seed of all random numbers";
-        swarm: SwarmPlace ["-"] = SwarmPlace::Auto, choice().search(),
-            "Where the particles of the front and of algorithm thesis live; auto: on the device from 4096 particles on, where a graphics processor evaluates";
+        seed: u64 = seed;
+        swarm: SwarmPlace = swarm;
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where lines are evaluated";
-        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
-            "Part of the name of the GPU to use, its place on the PCI bus, or all for several";
+        adapter: Option<String> = adapter;
     }
 
     /// Coefficients are those of the algorithm.

@@ -12,6 +12,7 @@ use crate::files::run_folder::SETTINGS;
 use crate::line::energy::Mode;
 use crate::study::framework::memory::{ANSWER, MemoryItem};
 use crate::study::framework::setups::{FreeParameter, MOST_SETUPS, check_parameters, free_parameters};
+use crate::study::framework::shared_settings::{adapter, envelope, seed, share, steering_rate_deg_s};
 use crate::study::raceline::RacelineSettings;
 use crate::vehicle::Car;
 use std::path::{Path, PathBuf};
@@ -25,12 +26,10 @@ settings! {
             "The circuit, for its edges: a bundled name, a shape, or a file; without it that of the run in whose folder the line lies";
         car: String ["-"] = "gt".to_owned(), name_or_file(),
             "The car: a bundled name (gt) or a TOML file";
-        envelope: Option<PathBuf> ["-"] = None, optional(file()).example("\"envelope.csv\""),
-            "The g-g-v envelope from a table instead of the car's own";
+        envelope: Option<PathBuf> = envelope;
         car_width_m: Option<f64> ["m"] = None, optional(number(0.0, 10.0)).example("1.3"),
             "Width of the car, all of which stays within the edges; without it 2 m, or that of the run in whose folder the line lies where it is less";
-        steering_rate_deg_s: Option<f64> ["deg/s"] = None, optional(number(0.1, 10_000.0)).example("40.0"),
-            "Fastest turn of the front wheels; without it the car's own";
+        steering_rate_deg_s: Option<f64> = steering_rate_deg_s;
         grip_shares: Option<Vec<f64>> ["-"] = None, optional(numbers(0.05, 1.0)).example("[0.7, 0.8, 0.9]"),
             "Shares of the envelope's grip to drive with; without it from 0.3 on for one line alone and from 0.8 on for a population";
         deployment: Option<PathBuf> ["-"] = None, optional(file()).example("\"lap_swarm.csv\""),
@@ -41,14 +40,11 @@ settings! {
             "Set-ups of the car to drive beside the car as it is";
         parameters: Vec<String> ["-"] = ["front_roll_moment_share", "aero_balance_front"].map(str::to_owned).to_vec(), texts(),
             "Parameters that set-ups move";
-        share: f64 ["-"] = 0.1, number(1e-6, 1.0),
-            "How far each goes either way, as a share of its value";
-        seed: u64 ["-"] = 1, count(0, u64::MAX).search(),
-            "Seed of the set-ups";
+        share: f64 = share;
+        seed: u64 = seed;
         backend: BackendChoice ["-"] = BackendChoice::Auto, choice().place(),
             "Where set-ups and several lines are driven; one line alone is driven in f64";
-        adapter: Option<String> ["-"] = None, optional(text()).place().example("\"llvmpipe\""),
-            "Part of the name of the GPU to use, its place on the PCI bus, or all for several";
+        adapter: Option<String> = adapter;
     }
 
     fn consistent(&self) -> Result<()> {

@@ -34,9 +34,10 @@ pub(super) struct Buffers {
     pub gathering: wgpu::Buffer,
     pub rows: wgpu::Buffer,
     pub swarm: wgpu::BindGroup,
-    /// Gathers positions, and own bests.
+    /// Gathers positions, own bests and objectives.
     pub gather: wgpu::BindGroup,
     pub gather_bests: wgpu::BindGroup,
+    pub gather_objectives: wgpu::BindGroup,
 }
 
 /// Kernels and buffers for so many objectives, and a row more if there are constraints; and the kernel that scatters the particles.
@@ -65,11 +66,12 @@ pub(super) fn on_device(
     let lanes = n.next_multiple_of(BLOCK) as u64;
     let width = objectives + usize::from(constrained);
     let (state, worth) = (lanes * d as u64 * 4, lanes * width as u64 * 4);
-    let members = (settings.archive + AT_ONCE) as u64;
+    // Pushed particles may follow an archive of their own.
+    let members = (2 * settings.archive + AT_ONCE) as u64;
     let most = PER_PLACE * settings.archive;
     // An own best may stand in for more than one member.
     let listed = HEADER + lanes.max(settings.archive as u64) * 16;
-    let gathered = (most.max(AT_ONCE) * d) as u64 * 4;
+    let gathered = (most.max(AT_ONCE) * d.max(width)) as u64 * 4;
     let largest = state.max(worth).max(listed + gathered);
     let room = most_particles(context, d);
     if n > room {
@@ -111,6 +113,7 @@ pub(super) fn on_device(
     let swarm = context.bind(&scatter, &state)?;
     let gather = context.bind(&kernels.gather, &[&gathering, &found, &position, &rows])?;
     let gather_bests = context.bind(&kernels.gather, &[&gathering, &found, &best_position, &rows])?;
+    let gather_objectives = context.bind(&kernels.gather, &[&gathering, &found, &worths, &rows])?;
     let buffers = Buffers {
         generation,
         archive: leaders,
@@ -126,6 +129,7 @@ pub(super) fn on_device(
         swarm,
         gather,
         gather_bests,
+        gather_objectives,
     };
     Ok((kernels, buffers, scatter))
 }

@@ -6,6 +6,7 @@ use crate::swarm::archive::Archive;
 use crate::swarm::checkpoint::Checkpoint;
 use crate::swarm::mopso::blocks::UNKNOWN;
 use crate::swarm::mopso::earnings::Earnings;
+use crate::swarm::mopso::relaxation::Pushing;
 use crate::swarm::settings::MopsoSettings;
 use crate::swarm::space::Space;
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,7 @@ pub struct DeviceState {
     /// With a row for violations behind those of the objectives, if there are constraints.
     pub(in crate::swarm) best_objectives: Vec<f32>,
     pub(in crate::swarm) archive: Archive,
+    pub(in crate::swarm) pushing: Pushing,
     pub(in crate::swarm) earnings: Earnings,
     pub(in crate::swarm) counters: Counters,
 }

@@ -7,6 +7,7 @@
 //! instructions. Results depend neither on the instruction set nor on how blocks are spread over threads.
 
 use super::earnings::{Earnings, Move};
+use super::relaxation::is_pushed;
 use crate::evaluate::resident::BLOCK;
 use crate::random::{Random, below_u32, unit_f32};
 use crate::scalar::elementary::power;
@@ -47,6 +48,8 @@ pub struct Generation {
     pub objectives: u32,
     /// Members of the archive.
     pub members: u32,
+    /// Members that pushed particles follow, behind the others; none where they follow the same.
+    pub pushed_members: u32,
     /// Whether pulls are constricted by a coefficient that is drawn with them.
     pub signed: u32,
     /// Whether each dimension has random numbers of its own.
@@ -57,6 +60,8 @@ pub struct Generation {
     pub constrained: u32,
     /// By how much the members of the archive do.
     pub violation: f32,
+    /// The violation that counts as none for pushed particles, and for an archive that they follow.
+    pub allowance: f32,
     /// Inertia.
     pub inertia: f32,
     /// Pull to the own best.
@@ -113,11 +118,13 @@ impl Generation {
             dimensions: dimensions as u32,
             objectives: objectives as u32,
             members: members as u32,
+            pushed_members: 0,
             signed: u32::from(motion.constriction == Constriction::Signed),
             per_dimension: u32::from(motion.randomness == Randomness::PerDimension),
             tournament: u32::from(settings.leaders == Leaders::Tournament),
             constrained: 0,
             violation: 0.0,
+            allowance: 0.0,
             inertia: inertia as f32,
             cognitive: cognitive as f32,
             social: social as f32,
@@ -133,6 +140,16 @@ impl Generation {
             mutation_power: (index + 1.0) as f32,
             mutation_root: (1.0 / (index + 1.0)) as f32,
             pulls: [DRAWN_PULLS[0] as f32, (DRAWN_PULLS[1] - DRAWN_PULLS[0]) as f32],
+        }
+    }
+
+    /// Where the leaders of a particle begin, and how many there are.
+    #[inline(always)]
+    fn led_by(&self, who: u32) -> (u32, u32) {
+        if is_pushed(who as usize) && self.pushed_members > 0 {
+            (self.members, self.pushed_members)
+        } else {
+            (0, self.members)
         }
     }
 
@@ -181,7 +198,7 @@ pub fn scatter(generation: &Generation, random: Random, first: u32, position: &m
     }
 }
 
-/// Takes positions for personal bests where their objectives are better; where neither is, by a coin.
+/// Takes positions for personal bests where their objectives are better; where neither is, by a coin. Returns which it has taken.
 #[inline(always)]
 pub fn judge(
     generation: &Generation,
@@ -189,7 +206,7 @@ pub fn judge(
     first: u32,
     (position, objectives): (Rows<'_>, Rows<'_>),
     (best_position, best_objectives): (&mut [f32], &mut [f32]),
-) {
+) -> [bool; BLOCK] {
     let coins = generation.words_of(random, Purpose::Coin, first, 0);
     let mut no_worse = [true; BLOCK];
     let mut no_better = [true; BLOCK];
@@ -221,9 +238,11 @@ pub fn judge(
     };
     take(best_position, position);
     take(best_objectives, objectives);
+    taken
 }
 
-/// Moves the particles of a block. `leaders` are the archive's positions, a row each, the greatest contribution first.
+/// Moves the particles of a block. `leaders` are the archive's positions, a row each, the greatest contribution first; then those that
+/// pushed particles follow.
 #[inline(always)]
 pub fn advance(
     generation: &Generation,
@@ -244,9 +263,10 @@ pub fn advance(
     let choice = g.words_of(random, Purpose::Recombine, first, 0);
     let mut leader = [0u32; BLOCK];
     for lane in 0..BLOCK {
-        let one = below_u32(choice[1][lane], g.members);
-        let two = below_u32(choice[2][lane], g.members);
-        leader[lane] = if g.tournament == 1 { one.min(two) } else { one };
+        let (begin, count) = g.led_by(first + lane as u32);
+        let one = below_u32(choice[1][lane], count);
+        let two = below_u32(choice[2][lane], count);
+        leader[lane] = begin + if g.tournament == 1 { one.min(two) } else { one };
     }
     let draws = g.words_of(random, Purpose::Pulls, first, 0);
     let (mut inertia, mut own, mut social) = ([0.0f32; BLOCK], [0.0f32; BLOCK], [0.0f32; BLOCK]);
@@ -336,7 +356,8 @@ fn difference(
 ) {
     let d = g.dimensions as usize;
     let picks = g.words(Purpose::Difference, who, 0);
-    let [one, two] = [0, 1].map(|i| below_u32(picks[i], g.members) as usize);
+    let (begin, count) = g.led_by(who);
+    let [one, two] = [0, 1].map(|i| (begin + below_u32(picks[i], count)) as usize);
     let always = below_u32(picks[2], g.dimensions) as usize;
     let whole = unit_f32(picks[3]) < ALL_COORDINATES;
     let mut words = [0; 4];
@@ -367,7 +388,8 @@ fn cross_few(
     for (i, lane) in lanes.iter().enumerate() {
         who[i] = first + *lane as u32;
         ones[i] = leader[*lane] as usize * d;
-        others[i] = below_u32(g.words(Purpose::Recombine, who[i], 1)[0], g.members) as usize * d;
+        let (begin, count) = g.led_by(who[i]);
+        others[i] = (begin + below_u32(g.words(Purpose::Recombine, who[i], 1)[0], count)) as usize * d;
     }
     for k in 0..d {
         let mut words = [[0; SIDE_BY_SIDE]; 4];

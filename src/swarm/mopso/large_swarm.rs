@@ -7,6 +7,7 @@
 use super::blocks::{Generation, UNKNOWN, advance, judge, scatter};
 use super::earnings::Earnings;
 use super::filter::{Point, front, part, point};
+use super::relaxation::{Pushing, counted, is_pushed};
 use super::stand_ins::StandIns;
 use super::thinning::{PER_PLACE, thinned};
 use crate::error::Result;
@@ -67,6 +68,7 @@ pub(super) struct LargeSwarm {
     /// `None` before any violation was told.
     best_violation: Vec<f64>,
     archive: Archive,
+    pushing: Pushing,
     earnings: Earnings,
     counters: Counters,
 }
@@ -92,7 +94,31 @@ impl LaneWork for Scatter<'_> {
     }
 }
 
-/// Updates the personal bests of a part of the swarm, and finds its points that may enter the archive.
+/// What a point has to be to enter an archive.
+struct Entrance {
+    /// The violation that counts as none.
+    allowance: f64,
+    /// The violation that the archive takes.
+    level: f64,
+    /// The objectives of its members, if they stay.
+    members: Vec<[f64; 3]>,
+}
+
+impl Entrance {
+    /// To `archive`, where the least violation of the swarm is `least`.
+    fn to(archive: &Archive, allowance: f64, least: f64) -> Self {
+        let known = archive.violation();
+        let level = known.min(counted(least, allowance));
+        let rows = archive.objectives.iter().filter(|_| level == known);
+        Self {
+            allowance,
+            level,
+            members: rows.map(|row| point(row, 0).at).collect(),
+        }
+    }
+}
+
+/// Updates the personal bests of a part of the swarm, and finds its points that may enter each of the archives.
 struct Learn<'a> {
     generation: &'a Generation,
     random: Random,
@@ -102,19 +128,19 @@ struct Learn<'a> {
     /// Nothing where there are no constraints, as is the best of each particle.
     violations: &'a [f64],
     best_violation: &'a mut [f64],
-    /// The violation that the archive takes.
-    level: f64,
+    /// The violation that counts as none for the bests of pushed particles.
+    allowance: f64,
     position: &'a [f32],
     best_position: &'a mut [f32],
     best_objectives: &'a mut [f32],
-    members: &'a [[f64; 3]],
+    entrances: &'a [Entrance],
 }
 
 impl LaneWork for Learn<'_> {
-    type Output = Vec<Point>;
+    type Output = Vec<Vec<Point>>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Vec<Point> {
+    fn run<L: Lanes>(self) -> Vec<Vec<Point>> {
         let width = self.generation.objectives as usize;
         let size = BLOCK * self.generation.dimensions as usize;
         let mut objectives = vec![UNKNOWN; BLOCK * width];
@@ -129,15 +155,18 @@ impl LaneWork for Learn<'_> {
             for (lane, row) in rows.enumerate() {
                 let i = block * BLOCK + lane;
                 let mut sound = self.failures[i].is_none() && row.iter().all(|x| x.is_finite());
-                if let (Some(best), Some(violation)) =
-                    (self.best_violation.get_mut(i), self.violations.get(i))
-                {
+                if let (Some(best), Some(violation)) = (self.best_violation.get(i), self.violations.get(i)) {
+                    let allowance = if is_pushed(self.first + i) {
+                        self.allowance
+                    } else {
+                        0.0
+                    };
+                    let [known, counts] = [*best, *violation].map(|v| counted(v, allowance));
                     // Less is better whatever was known before, and more is never.
-                    if sound && *violation < *best {
-                        *best = *violation;
+                    if sound && counts < known {
                         (0..width).for_each(|k| best_objectives[k * BLOCK + lane] = UNKNOWN);
                     }
-                    sound &= *violation == *best;
+                    sound &= counts <= known;
                 }
                 if sound {
                     for (k, value) in row.iter().enumerate() {
@@ -145,17 +174,25 @@ impl LaneWork for Learn<'_> {
                     }
                 }
             }
-            judge(
+            let taken = judge(
                 self.generation,
                 self.random,
                 (self.first + block * BLOCK) as u32,
                 (position, &objectives),
                 (best_position, best_objectives),
             );
+            let violations = self.violations.iter().skip(block * BLOCK);
+            let bests = self.best_violation.iter_mut().skip(block * BLOCK);
+            for ((best, violation), taken) in bests.zip(violations).zip(taken) {
+                *best = if taken { *violation } else { *best };
+            }
         }
-        let sound =
-            |i: usize| self.failures[i].is_none() && self.violations.get(i).is_none_or(|v| *v == self.level);
-        part(self.rows, width, self.first as u32, sound, self.members)
+        let points = |entrance: &Entrance| {
+            let within = |violation: &f64| counted(*violation, entrance.allowance) == entrance.level;
+            let sound = |i: usize| self.failures[i].is_none() && self.violations.get(i).is_none_or(within);
+            part(self.rows, width, self.first as u32, sound, &entrance.members)
+        };
+        self.entrances.iter().map(points).collect()
     }
 }
 
@@ -225,6 +262,7 @@ impl LargeSwarm {
             best_objectives: vec![UNKNOWN; lanes * width],
             best_violation: Vec::new(),
             archive,
+            pushing: Pushing::default(),
             objectives: width,
             position,
             random,
@@ -262,6 +300,7 @@ impl LargeSwarm {
             best_position: self.best_position.clone(),
             best_objectives: self.best_objectives.clone(),
             archive: self.archive.clone(),
+            pushing: self.pushing.clone(),
             earnings: self.earnings.clone(),
             counters: self.counters,
         })
@@ -283,6 +322,7 @@ impl LargeSwarm {
             best_objectives,
             best_violation,
             archive: state.archive,
+            pushing: state.pushing,
             earnings: state.earnings,
             counters: state.counters,
         }
@@ -324,8 +364,9 @@ impl LargeSwarm {
         Generation::new(&self.settings, &self.earnings, sizes, self.counters.iteration)
     }
 
-    /// The points of the swarm that may enter the archive, and their violation.
-    fn learn(&mut self, evaluation: &Evaluation) -> (Vec<Point>, f64) {
+    /// The points of the swarm that may enter the archive and their violation; the same of the archive that pushed particles follow, if
+    /// there is one.
+    fn learn(&mut self, evaluation: &Evaluation) -> Vec<(Vec<Point>, f64)> {
         let (d, width) = (self.space.dimensions(), self.objectives);
         let generation = self.generation();
         let random = self.random;
@@ -344,10 +385,18 @@ impl LargeSwarm {
             };
             self.best_violation = vec![known; n];
         }
-        let level = self.level(evaluation, &violations);
-        let better = level < self.archive.violation();
-        let rows = self.archive.objectives.iter().filter(|_| !better);
-        let members: Vec<[f64; 3]> = rows.map(|row| point(row, 0).at).collect();
+        let [least, most] = self.bounds(evaluation, &violations);
+        let iteration = self.counters.iteration;
+        self.pushing.advance(&self.archive, &self.settings, iteration);
+        let allowance = self.pushing.allowance();
+        self.pushing
+            .begin(most > 0.0, &self.archive, &self.settings, iteration);
+        let relaxed = self.pushing.relaxation();
+        let pushed_to =
+            relaxed.map(|relaxed| Entrance::to(&relaxed.archive, self.pushing.allowance(), least));
+        let entrances: Vec<Entrance> = std::iter::once(Entrance::to(&self.archive, 0.0, least))
+            .chain(pushed_to)
+            .collect();
         let part_of = |i: usize, all: usize| (i * PART).min(all)..((i + 1) * PART).min(all);
         let parts = evaluation
             .objectives
@@ -358,7 +407,7 @@ impl LargeSwarm {
             .zip(self.best_objectives.par_chunks_mut(PART * width))
             .zip(pieces(&mut self.best_violation, n))
             .enumerate();
-        let fronts: Vec<Vec<Point>> = parts
+        let fronts: Vec<Vec<Vec<Point>>> = parts
             .map(
                 |(
                     number,
@@ -372,42 +421,49 @@ impl LargeSwarm {
                         failures,
                         violations: &violations[part_of(number, violations.len())],
                         best_violation,
-                        level,
+                        allowance,
                         position,
                         best_position,
                         best_objectives,
-                        members: &members,
+                        entrances: &entrances,
                     };
                     dispatch(InstructionSet::best(), learn)
                 },
             )
             .collect();
-        (front(fronts.concat(), width), level)
+        let of = |(number, entrance): (usize, &Entrance)| {
+            let points = fronts.iter().flat_map(|fronts| fronts[number].iter().copied());
+            (front(points.collect(), width), entrance.level)
+        };
+        entrances.iter().enumerate().map(of).collect()
     }
 
-    /// The violation that the archive takes after this evaluation: the least of its own and of those that are told.
-    fn level(&self, evaluation: &Evaluation, violations: &[f64]) -> f64 {
+    /// The least and the greatest violation that is told of a candidate that has not failed.
+    fn bounds(&self, evaluation: &Evaluation, violations: &[f64]) -> [f64; 2] {
         if violations.is_empty() {
-            return 0.0;
+            return [0.0; 2];
         }
         let rows = evaluation.objectives.chunks_exact(self.objectives);
         let sound = rows
             .zip(&evaluation.failures)
             .map(|(row, failure)| failure.is_none() && row.iter().all(|x| x.is_finite()));
         let told = sound.zip(violations).filter(|(sound, _)| *sound).map(|(_, v)| *v);
-        told.fold(self.archive.violation(), f64::min)
+        told.fold([f64::INFINITY, 0.0], |[least, most], v| {
+            [least.min(v), most.max(v)]
+        })
     }
 
-    /// The positions that lead and mate, the best first: the archive's, and own bests that stand in for members.
-    fn leaders(&mut self) -> Vec<f32> {
-        let mut leading = leaders(&mut self.archive);
-        let stand_ins = StandIns::draw(&self.archive, &self.settings, self.counters, &self.best_violation);
-        if stand_ins.instead_of_members {
-            leading.clear();
-        }
+    /// The positions that lead and mate, the best first: the members of an archive that has been measured, and own bests that stand in for
+    /// them.
+    fn leaders(&self, archive: &Archive) -> Vec<f32> {
+        let d = self.space.dimensions();
+        let stand_ins = StandIns::draw(archive, &self.settings, self.counters, &self.best_violation);
+        let mut leading = match stand_ins.instead_of_members {
+            true => Vec::new(),
+            false => leaders(archive, d),
+        };
         for particle in stand_ins.particles {
-            let coordinates = 0..self.space.dimensions();
-            leading.extend(coordinates.map(|k| self.best_position[self.place(particle, k)]));
+            leading.extend((0..d).map(|k| self.best_position[self.place(particle, k)]));
         }
         leading
     }
@@ -415,9 +471,15 @@ impl LargeSwarm {
     /// Moves the swarm.
     fn advance(&mut self) {
         let d = self.space.dimensions();
-        let leaders = self.leaders();
+        measure(&mut self.archive, &mut self.pushing);
+        let mut leaders = self.leaders(&self.archive);
+        let members = (leaders.len() / d.max(1)) as u32;
+        if let Some(relaxation) = self.pushing.relaxation() {
+            leaders.extend(self.leaders(&relaxation.archive));
+        }
         let generation = Generation {
-            members: (leaders.len() / d.max(1)) as u32,
+            members,
+            pushed_members: (leaders.len() / d.max(1)) as u32 - members,
             ..self.generation()
         };
         let random = self.random;
@@ -449,42 +511,62 @@ fn pieces(state: &mut [f64], n: usize) -> Vec<&mut [f64]> {
     state.chunks_mut(PART).collect()
 }
 
-/// The archive's positions, the greatest contribution first.
-pub fn leaders(archive: &mut Archive) -> Vec<f32> {
+/// Works out what the members of the archives contribute.
+pub fn measure(archive: &mut Archive, pushing: &mut Pushing) {
     archive.measure();
+    if let Some(relaxation) = pushing.relaxation_mut() {
+        relaxation.archive.measure();
+    }
+}
+
+/// The positions of an archive that has been measured, the greatest contribution first.
+pub fn leaders(archive: &Archive, dimensions: usize) -> Vec<f32> {
     let worth = archive.worth();
     let mut order: Vec<usize> = (0..worth.len()).collect();
     order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
-    let coordinate = |i: usize| archive.positions[i].iter().map(|x| *x as f32);
-    order.into_iter().flat_map(coordinate).collect()
+    let coordinates = |i: usize| archive.positions[i][..dimensions].iter().map(|x| *x as f32);
+    order.into_iter().flat_map(coordinates).collect()
 }
 
-/// Puts points of the swarm and their positions into the archive, and lets its moves know what they have earned. A move earns where
-/// its candidate takes the place of a member that it dominates.
+/// Points of the swarm that an archive may take in, and their positions. Behind the coordinates for the archive that pushed particles
+/// follow stands the violation.
+pub struct Newcomers {
+    pub found: Vec<(Point, Vec<f64>)>,
+    /// The violation that counts for all of them.
+    pub violation: f64,
+}
+
+/// Puts newcomers into the archive and into that of pushed particles, and lets moves know what they have earned. A move earns where its
+/// candidate takes the place of a member that it dominates, in the archive that its particle follows.
 pub fn take_in(
-    archive: &mut Archive,
-    earnings: &mut Earnings,
+    (archive, pushing, earnings): (&mut Archive, &mut Pushing, &mut Earnings),
     generation: &Generation,
-    found: Vec<(Point, Vec<f64>)>,
-    violation: f64,
+    newcomers: Vec<Newcomers>,
 ) {
     let width = generation.objectives as usize;
-    let (members, level) = (archive.objectives.clone(), archive.violation());
-    let points: Vec<Point> = found.iter().map(|(point, _)| *point).collect();
-    let row = |point: &Point| point.at[..width].to_vec();
-    let solutions = found.into_iter().map(|(point, position)| (position, row(&point)));
-    archive.insert_all(solutions.collect(), violation);
     // Before, nobody moved towards anything.
-    if members.is_empty() || generation.when == 0 {
-        return;
-    }
+    let moved = !archive.is_empty() && generation.when > 0;
+    let pushes = newcomers.len() > 1;
+    let pushed_to = pushing.relaxation_mut().map(|relaxation| &mut relaxation.archive);
+    let archives = std::iter::once(archive).chain(pushed_to);
     let mut earned = [0.0; 3];
-    for point in &points {
-        let row = row(point);
-        let takes = violation < level || members.iter().any(|member| dominates(&row, member));
-        if takes && archive.objectives.contains(&row) {
-            earned[generation.made_by(point.who) as usize] += 1.0;
+    for (number, (archive, Newcomers { found, violation })) in archives.zip(newcomers).enumerate() {
+        let (members, level) = (archive.objectives.clone(), archive.violation());
+        let points: Vec<Point> = found.iter().map(|(point, _)| *point).collect();
+        let row = |point: &Point| point.at[..width].to_vec();
+        let solutions = found.into_iter().map(|(point, position)| (position, row(&point)));
+        archive.insert_all(solutions.collect(), violation);
+        let follows = |point: &&Point| !pushes || is_pushed(point.who as usize) == (number > 0);
+        for point in points.iter().filter(follows) {
+            let row = row(point);
+            let takes = violation < level || members.iter().any(|member| dominates(&row, member));
+            if moved && takes && archive.objectives.contains(&row) {
+                earned[generation.made_by(point.who) as usize] += 1.0;
+            }
         }
+    }
+    if !moved {
+        return;
     }
     let [crossings, no_pulls] = [generation.crossings, generation.no_pulls].map(f64::from);
     let shares = [1.0 - no_pulls, no_pulls - crossings, crossings];
@@ -514,23 +596,26 @@ impl Optimiser for LargeSwarm {
 
     fn tell(&mut self, evaluation: &Evaluation) -> Result<()> {
         evaluation.check(self.settings.motion.population, self.objectives)?;
-        let (found, violation) = self.learn(evaluation);
-        let wanted = PER_PLACE * self.settings.archive;
-        let found = thinned(found, self.objectives, wanted, self.archive.fixed_reference());
-        let d = self.space.dimensions();
-        let solution = |point: Point| {
-            let at = |k: usize| f64::from(self.position[self.place(point.who as usize, k)]);
-            (point, (0..d).map(at).collect())
+        let (width, wanted) = (self.objectives, PER_PLACE * self.settings.archive);
+        let found = self.learn(evaluation);
+        let newcomers = |(number, (points, violation)): (usize, (Vec<Point>, f64))| {
+            let points = thinned(points, width, wanted, self.archive.fixed_reference());
+            let solution = |point: Point| {
+                let who = point.who as usize;
+                let at = |k: usize| f64::from(self.position[self.place(who, k)]);
+                let violation = (number > 0).then(|| evaluation.violation(who));
+                let position = (0..self.space.dimensions()).map(at).chain(violation);
+                (point, position.collect())
+            };
+            Newcomers {
+                found: points.into_iter().map(solution).collect(),
+                violation,
+            }
         };
-        let solutions = found.into_iter().map(solution).collect();
+        let newcomers = found.into_iter().enumerate().map(newcomers).collect();
         let generation = self.generation();
-        take_in(
-            &mut self.archive,
-            &mut self.earnings,
-            &generation,
-            solutions,
-            violation,
-        );
+        let state = (&mut self.archive, &mut self.pushing, &mut self.earnings);
+        take_in(state, &generation, newcomers);
         self.counters.told(self.settings.motion.population);
         self.advance();
         Ok(())

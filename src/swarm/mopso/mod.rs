@@ -4,7 +4,7 @@ pub(super) mod blocks;
 pub(super) mod earnings;
 pub(super) mod filter;
 pub(super) mod large_swarm;
-mod relaxation;
+pub(super) mod relaxation;
 mod small_swarm;
 pub(super) mod stand_ins;
 pub(super) mod thinning;

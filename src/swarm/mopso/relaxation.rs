@@ -1,4 +1,4 @@
-//! Constraints that a small swarm ignores at first and takes back step by step.
+//! Constraints that a swarm ignores at first and takes back step by step.
 //!
 //! A swarm that keeps to its constraints from the start stays in the feasible region where it lands: it crosses no infeasible land, and
 //! hardly moves along a thin shell. So half of the particles are first pushed to the front of the problem without constraints, and
@@ -20,12 +20,62 @@ const PULL: f64 = 0.5;
 /// What is left of the allowance is this power of what is left of the pull. With 3, the median hypervolumes of LIR-CMOP1 to 3, thin shells,
 /// are 7 to 17 % lower.
 const POWER: i32 = 5;
-/// One particle of so many keeps to the constraints. With 3, OSY ends at a hypervolume of 0.950 instead of 0.962.
+/// One particle of so many keeps to the constraints, in `shaders/swarm.wgsl` too. With 3, OSY ends at a hypervolume of 0.950 instead of 0.962.
 const KEEPING: usize = 2;
+
+/// Whether constraints are relaxed: from the first violation on, until they are taken back.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Pushing {
+    /// Whether a candidate has violated them.
+    violated: bool,
+    relaxation: Option<Box<Relaxation>>,
+}
+
+impl Pushing {
+    /// What is relaxed now, if anything is.
+    pub fn relaxation(&self) -> Option<&Relaxation> {
+        self.relaxation.as_deref()
+    }
+
+    pub fn relaxation_mut(&mut self) -> Option<&mut Relaxation> {
+        self.relaxation.as_deref_mut()
+    }
+
+    /// The violation that counts as none for particles that are pushed.
+    pub fn allowance(&self) -> f64 {
+        self.relaxation().map_or(0.0, |relaxation| relaxation.allowance)
+    }
+
+    /// Takes constraints back as far as this iteration of a swarm of this archive asks for.
+    pub fn advance(&mut self, archive: &Archive, settings: &MopsoSettings, iteration: usize) {
+        self.relaxation
+            .take_if(|relaxation| !relaxation.advance(archive, settings, iteration));
+    }
+
+    /// Relaxes them if this is the first violation.
+    pub fn begin(&mut self, violated: bool, archive: &Archive, settings: &MopsoSettings, iteration: usize) {
+        if violated && !self.violated {
+            self.violated = true;
+            self.relaxation = Relaxation::of(archive, settings, iteration).map(Box::new);
+        }
+    }
+}
+
+/// The violation that counts where one of this allowance counts as none.
+#[inline(always)]
+pub fn counted(violation: f64, allowance: f64) -> f64 {
+    if violation <= allowance { 0.0 } else { violation }
+}
+
+/// Whether a particle is pushed while constraints are relaxed.
+#[inline(always)]
+pub fn is_pushed(particle: usize) -> bool {
+    !particle.is_multiple_of(KEEPING)
+}
 
 /// The relaxed constraints: a candidate that violates them by no more than the allowance counts as feasible.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct Relaxation {
+pub struct Relaxation {
     allowance: f64,
     /// The allowance at the beginning of the pull, and its iteration.
     pull: Option<(f64, usize)>,
@@ -37,7 +87,7 @@ pub(super) struct Relaxation {
 
 impl Relaxation {
     /// For a swarm whose archive this is; nothing where the push is over.
-    pub fn of(archive: &Archive, settings: &MopsoSettings, iteration: usize) -> Option<Self> {
+    fn of(archive: &Archive, settings: &MopsoSettings, iteration: usize) -> Option<Self> {
         let wanted = settings.push_and_pull && share(iteration, settings) < LONGEST_PUSH;
         wanted.then(|| {
             let mut relaxed = Self {
@@ -52,18 +102,9 @@ impl Relaxation {
         })
     }
 
-    /// Whether a particle keeps to the constraints all the same.
-    pub fn leaves_out(particle: usize) -> bool {
-        particle.is_multiple_of(KEEPING)
-    }
-
     /// The violation that counts.
     pub fn violation(&self, violation: f64) -> f64 {
-        if violation <= self.allowance {
-            0.0
-        } else {
-            violation
-        }
+        counted(violation, self.allowance)
     }
 
     /// Offers a candidate to the archive; returns whether it was inserted.
@@ -74,7 +115,7 @@ impl Relaxation {
     }
 
     /// Goes on to this iteration of a swarm of this archive; returns whether constraints are still relaxed.
-    pub fn advance(&mut self, archive: &Archive, settings: &MopsoSettings, iteration: usize) -> bool {
+    fn advance(&mut self, archive: &Archive, settings: &MopsoSettings, iteration: usize) -> bool {
         let Some((allowance, begun)) = self.pull else {
             if self.pushes(settings, iteration) {
                 return true;

@@ -1,7 +1,7 @@
 //! The small swarm: double precision, one particle after the other.
 
 use super::earnings::{Earnings, Move};
-use super::relaxation::Relaxation;
+use super::relaxation::{Pushing, is_pushed};
 use crate::error::Result;
 use crate::evaluate::{Evaluation, Problem};
 use crate::random::Random;
@@ -26,10 +26,7 @@ pub(super) struct SmallSwarm {
     best_objectives: Vec<Vec<f64>>,
     best_violation: Vec<f64>,
     archive: Archive,
-    /// While constraints are relaxed.
-    relaxation: Option<Box<Relaxation>>,
-    /// Whether a candidate has violated them.
-    violated: bool,
+    pushing: Pushing,
     earnings: Earnings,
     counters: Counters,
 }
@@ -47,8 +44,7 @@ impl SmallSwarm {
             best_violation: vec![f64::INFINITY; settings.motion.population],
             objectives: problem.objectives.len(),
             archive: settings.empty_archive(problem.objectives.len())?,
-            relaxation: None,
-            violated: false,
+            pushing: Pushing::default(),
             random,
             particles,
             trials: Trials::default(),
@@ -192,14 +188,20 @@ impl SmallSwarm {
 
     /// Moves the particles: those that keep to the constraints by the archive, the others by that of the relaxed constraints.
     fn advance(&mut self) {
-        let Some(mut relaxation) = self.relaxation.take() else {
+        if self.pushing.relaxation().is_none() {
             return self.advance_some(|_| true);
-        };
-        self.advance_some(Relaxation::leaves_out);
-        std::mem::swap(&mut self.archive, &mut relaxation.archive);
-        self.advance_some(|particle| !Relaxation::leaves_out(particle));
-        std::mem::swap(&mut self.archive, &mut relaxation.archive);
-        self.relaxation = Some(relaxation);
+        }
+        self.advance_some(|particle| !is_pushed(particle));
+        self.exchange_archives();
+        self.advance_some(is_pushed);
+        self.exchange_archives();
+    }
+
+    /// The archive that pushed particles follow takes the place of the swarm's, or the other way.
+    fn exchange_archives(&mut self) {
+        if let Some(relaxation) = self.pushing.relaxation_mut() {
+            std::mem::swap(&mut self.archive, &mut relaxation.archive);
+        }
     }
 
     /// Moves these particles by the archive.
@@ -235,18 +237,6 @@ impl SmallSwarm {
             let (motion, now) = (&self.settings.motion, (share, self.counters.iteration));
             self.particles
                 .mutate(particle, motion.mutation, now, self.random, &mut self.trials);
-        }
-    }
-
-    /// Relaxes the constraints from the first violation on, and takes them back while iterations go by.
-    fn relax(&mut self, evaluation: &Evaluation) {
-        let (iteration, settings, archive) = (self.counters.iteration, &self.settings, &self.archive);
-        if !self.violated && evaluation.violations.iter().any(|violation| *violation > 0.0) {
-            self.violated = true;
-            self.relaxation = Relaxation::of(archive, settings, iteration).map(Box::new);
-        } else {
-            self.relaxation
-                .take_if(|relaxation| !relaxation.advance(archive, settings, iteration));
         }
     }
 
@@ -301,7 +291,13 @@ impl Optimiser for SmallSwarm {
         let scattered = self.archive.is_empty() || self.counters.iteration == 0;
         let before = self.earnings.clone();
         self.earnings.fade();
-        self.relax(evaluation);
+        let (iteration, violated) = (
+            self.counters.iteration,
+            evaluation.violations.iter().any(|v| *v > 0.0),
+        );
+        self.pushing.advance(&self.archive, &self.settings, iteration);
+        self.pushing
+            .begin(violated, &self.archive, &self.settings, iteration);
         for (particle, of) in rows.into_iter().enumerate() {
             let Some(row) = evaluation.success(of, self.objectives) else {
                 continue;
@@ -309,17 +305,17 @@ impl Optimiser for SmallSwarm {
             let range = self.particles.row(particle);
             let position = &self.particles.position[range.clone()];
             let told = evaluation.violation(of);
-            let relaxed = !Relaxation::leaves_out(particle);
-            let relaxation = self.relaxation.as_ref().filter(|_| relaxed);
+            let pushed = is_pushed(particle);
+            let relaxation = self.pushing.relaxation().filter(|_| pushed);
             let counts = |violation| relaxation.map_or(violation, |r| r.violation(violation));
             let (violation, least) = (counts(told), counts(self.best_violation[particle]));
             let followed = relaxation.map_or(&self.archive, |r| &r.archive);
             let mut members = followed.objectives.iter();
             let takes = violation < followed.violation() || members.any(|member| dominates(row, member));
             let mut entered = self.archive.insert_violating(position, row, told);
-            if let Some(relaxation) = &mut self.relaxation {
+            if let Some(relaxation) = self.pushing.relaxation_mut() {
                 let entered_relaxed = relaxation.insert(position, row, told);
-                if relaxed {
+                if pushed {
                     entered = entered_relaxed;
                 }
             }
