@@ -512,8 +512,8 @@ fn aligned(line: &str, comment: &str) -> String {
 /// Declares a struct of settings: its fields with unit, default, kind and meaning.
 ///
 /// A field reads `name: Type [unit] = default, kind, meaning;`, with `as "table.key"` after the type where its key in files is
-/// another one. Kinds are in [`crate::config::kinds`]. A setting that several studies have reads `name: Type = shared_name;`, and is
-/// declared by [`shared_settings`].
+/// another one. Kinds are in [`crate::config::kinds`]. A setting that several studies have reads `name: Type = shared_name;`; a
+/// macro of that name says its unit, default, kind and meaning.
 macro_rules! settings {
     (
         $(#[$doc:meta])*
@@ -559,30 +559,6 @@ macro_rules! settings {
     };
 }
 pub(crate) use settings;
-
-/// Declares settings that several studies have, for [`settings`]: `name [unit] = default, kind, meaning;`.
-macro_rules! shared_settings {
-    ($($name:ident [$unit:literal] = $default:expr, $kind:expr, $meaning:literal;)*) => {
-        $(
-            macro_rules! $name {
-                (unit) => {
-                    $unit
-                };
-                (default) => {
-                    $default
-                };
-                (kind) => {
-                    $kind
-                };
-                (meaning) => {
-                    $meaning
-                };
-            }
-            pub(crate) use $name;
-        )*
-    };
-}
-pub(crate) use shared_settings;
 
 /// The last of a field's names.
 pub(crate) const fn key_of(names: &[&'static str]) -> &'static str {

@@ -1,6 +1,27 @@
 //! Settings that several studies have. The names of kinds in them are looked up where a study has the setting.
 
-use crate::config::settings::shared_settings;
+/// Declares settings for [`crate::config::settings::settings`]: `name [unit] = default, kind, meaning;`.
+macro_rules! shared_settings {
+    ($($name:ident [$unit:literal] = $default:expr, $kind:expr, $meaning:literal;)*) => {
+        $(
+            macro_rules! $name {
+                (unit) => {
+                    $unit
+                };
+                (default) => {
+                    $default
+                };
+                (kind) => {
+                    $kind
+                };
+                (meaning) => {
+                    $meaning
+                };
+            }
+            pub(crate) use $name;
+        )*
+    };
+}
 
 shared_settings! {
     channel_map ["-"] = None, optional(file()).example("\"channels.toml\""),
