@@ -161,7 +161,7 @@ impl LaneWork for Learn<'_> {
                     } else {
                         0.0
                     };
-                    let [known, counts] = [*best, *violation].map(|v| counted(v, allowance));
+                    let (known, counts) = (counted(*best, allowance), counted(*violation, allowance));
                     // Less is better whatever was known before, and more is never.
                     if sound && counts < known {
                         (0..width).for_each(|k| best_objectives[k * BLOCK + lane] = UNKNOWN);
@@ -187,12 +187,19 @@ impl LaneWork for Learn<'_> {
                 *best = if taken { *violation } else { *best };
             }
         }
-        let points = |entrance: &Entrance| {
+        let mut fronts = Vec::with_capacity(self.entrances.len());
+        for entrance in self.entrances {
             let within = |violation: &f64| counted(*violation, entrance.allowance) == entrance.level;
             let sound = |i: usize| self.failures[i].is_none() && self.violations.get(i).is_none_or(within);
-            part(self.rows, width, self.first as u32, sound, &entrance.members)
-        };
-        self.entrances.iter().map(points).collect()
+            fronts.push(part(
+                self.rows,
+                width,
+                self.first as u32,
+                sound,
+                &entrance.members,
+            ));
+        }
+        fronts
     }
 }
 
