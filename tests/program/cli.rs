@@ -636,6 +636,44 @@ fn a_log_that_a_study_takes_is_one_that_check_takes() {
     }
 }
 
+/// What is measured goes to stdout, with `--json` to stderr beside the object, and with `--quiet` nowhere.
+#[test]
+fn a_benchs_table_goes_where_it_is_asked_to() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let bench = [
+        "bench",
+        "swarm",
+        "--populations",
+        "100",
+        "--problems",
+        "zdt1",
+        "--generations",
+        "2",
+        "--repeats",
+        "1",
+        "--backend",
+        "cpu",
+    ];
+    for (flags, on_stdout, on_stderr) in [
+        (&[][..], true, false),
+        (&["--json"], false, true),
+        (&["--quiet"], false, false),
+        (&["--quiet", "--json"], false, false),
+    ] {
+        let run = lapswarm(folder.path(), &[&bench[..], flags].concat());
+        assert!(run.status.success(), "{flags:?}: {}", said(&run));
+        let has_table = |output: &[u8]| text(output).contains("backend problem");
+        assert_eq!(has_table(&run.stdout), on_stdout, "{flags:?}");
+        assert_eq!(has_table(&run.stderr), on_stderr, "{flags:?}");
+        assert_eq!(
+            text(&run.stdout).starts_with('{'),
+            flags.contains(&"--json"),
+            "{flags:?}"
+        );
+        assert_eq!(run.stdout.is_empty(), flags == ["--quiet"], "{flags:?}");
+    }
+}
+
 #[test]
 fn completions_name_every_command() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -20,7 +20,8 @@ const PULL: f64 = 0.5;
 /// What is left of the allowance is this power of what is left of the pull. With 3, the median hypervolumes of LIR-CMOP1 to 3, thin shells,
 /// are 7 to 17 % lower.
 const POWER: i32 = 5;
-/// One particle of so many keeps to the constraints, in `shaders/swarm.wgsl` too. With 3, OSY ends at a hypervolume of 0.950 instead of 0.962.
+/// One particle of so many keeps to the constraints, in `shaders/swarm.wgsl` too. With 3, OSY ends at a hypervolume of 0.950 instead of
+/// 0.962.
 const KEEPING: usize = 2;
 
 /// Whether constraints are relaxed: from the first violation on, until they are taken back.
